@@ -1,0 +1,2 @@
+//! Lucerna.
+fn main() {}
