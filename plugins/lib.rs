@@ -1,1 +1,33 @@
-//! Plugins.
+//! Everything a scene can choose.
+//!
+//! One folder per kind, one file per plugin, named after its XML `type`. The head of the file is its manual. To add
+//! one, see `README.md` beside this file.
+#![forbid(unsafe_code)]
+
+pub mod bsdfs;
+pub mod emitters;
+pub mod films;
+pub mod integrators;
+pub mod rfilters;
+pub mod samplers;
+pub mod sensors;
+pub mod shapes;
+pub mod textures;
+
+use lucerna_core::scene::Registry;
+
+/// All plugins of this package.
+pub fn builtin() -> Registry {
+    let mut registry = Registry::new();
+    registry
+        .add_all(integrators::PLUGINS)
+        .add_all(sensors::PLUGINS)
+        .add_all(films::PLUGINS)
+        .add_all(rfilters::PLUGINS)
+        .add_all(samplers::PLUGINS)
+        .add_all(emitters::PLUGINS)
+        .add_all(shapes::PLUGINS)
+        .add_all(bsdfs::PLUGINS)
+        .add_all(textures::PLUGINS);
+    registry
+}

@@ -8,4 +8,10 @@
 //! The conventions that every module shares are stated once, in [`interfaces`].
 #![deny(unsafe_code)]
 
+pub mod accel;
+pub mod color;
+pub mod interfaces;
+pub mod math;
+pub mod render;
+pub mod sampling;
 pub mod scene;

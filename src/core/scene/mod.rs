@@ -2,11 +2,21 @@
 //!
 //! ```text
 //! scene.xml ─ xml ─► Description ─ upgrade ─► Description in today's names ─ resolve ─► references joined
-//!           ─ instantiate ► Scene
+//!           ─ check ─► every parameter known and in range ─ instantiate ► Scene
 //! ```
 
 pub mod description;
 pub mod error;
+pub mod object;
+pub mod param;
+pub mod properties;
+pub mod registry;
+mod world;
 
 pub use description::{Description, Node, NodeId, ObjectKind, Parameter, SpectrumValue, Value};
 pub use error::{Location, SceneError, SceneErrors, did_you_mean};
+pub use object::{BuiltSensor, BuiltShape, Object};
+pub use param::{Param, Slot};
+pub use properties::Properties;
+pub use registry::{Built, Constructor, Failed, Plugin, Registry};
+pub use world::{EmitterId, EmitterSource, Scene, ShapeGroup, shadow_ray};

@@ -1,0 +1,7 @@
+//! Colour: linear RGB, and spectra reduced to it as the reference renderer does.
+
+pub mod ior;
+mod rgb;
+pub mod spectrum;
+
+pub use rgb::Rgb;

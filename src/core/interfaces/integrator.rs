@@ -1,0 +1,48 @@
+//! Light transport.
+
+use super::Arena;
+use crate::accel::Ray;
+use crate::color::Rgb;
+use crate::render::{RenderContext, RenderError, Report};
+use crate::sampling::Stream;
+use crate::scene::Scene;
+
+/// Owns its passes: training, restarts, combination.
+pub trait Integrator: Send + Sync {
+    /// Renders into the context's film.
+    fn render(&self, cx: &mut RenderContext<'_>) -> Result<Report, RenderError>;
+
+    /// Names of the channels after colour and alpha, in order. Empty for most.
+    fn aov_names(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// The integrator as a forward estimator, if it is one; only these can be nested.
+    fn estimator(&self) -> Option<&dyn RadianceEstimator> {
+        None
+    }
+}
+
+/// What one camera path found.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Radiance {
+    /// Incident radiance.
+    pub rgb: Rgb,
+    /// Alpha: 1 where the path met something that is not transparent, else 0.
+    pub alpha: f32,
+}
+
+/// A forward estimator without state between samples; the pass loop is shared
+/// ([`crate::render::render_estimator`]).
+pub trait RadianceEstimator: Send + Sync {
+    /// Unbiased estimate of the radiance along `ray`. `aovs` has as many entries as
+    /// [`Integrator::aov_names`] and is zero on entry.
+    fn radiance(
+        &self,
+        scene: &Scene,
+        ray: &Ray,
+        stream: &mut Stream<'_>,
+        arena: &mut Arena,
+        aovs: &mut [f32],
+    ) -> Radiance;
+}

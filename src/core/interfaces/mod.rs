@@ -1,0 +1,37 @@
+//! One trait per kind of plugin.
+//!
+//! # Conventions, stated here and nowhere else
+//!
+//! * Directions have unit length and point *away* from the surface: `wi` towards where the path came from (the
+//!   camera side), `wo` towards where it goes on. BSDF directions are local: z is the shading normal.
+//! * BSDF values include `|cos θo|` except for delta lobes, whose value is the weight itself.
+//! * Densities are per unit solid angle unless the name says `_area`, `_length` or `_discrete`.
+//! * `None` means "no energy", never an error.
+//! * Radiance is in W·m⁻²·sr⁻¹, linear sRGB primaries. Lengths are scene units. Angles are radians in code, degrees
+//!   in scene files.
+//! * Random numbers are in [0, 1), named `u`, `u1` (one), `u2` (two).
+//! * Probabilities of mixtures are named for what they choose: `p_guide`, `p_bsdf`.
+//! * `eta` is the index of refraction of the inside over that of the outside; on a scattering event, of the side the
+//!   path goes to over the side it came from.
+
+mod bsdf;
+mod emitter;
+mod film;
+mod integrator;
+mod rfilter;
+mod sampler;
+mod sensor;
+mod shape;
+mod surface;
+mod texture;
+
+pub use bsdf::{Arena, Bsdf, Bxdf, BxdfSample, Lobes, Transport};
+pub use emitter::{Emitter, EmitterFlags, LightPoint, LightSample};
+pub use film::{ComponentFormat, FileFormat, Film, FilmSettings, PixelFormat};
+pub use integrator::{Integrator, Radiance, RadianceEstimator};
+pub use rfilter::Rfilter;
+pub use sampler::{Sampler, mix, stream};
+pub use sensor::{CameraRay, Sensor};
+pub use shape::{AreaSample, Shape};
+pub use surface::SurfaceHit;
+pub use texture::{ColorSource, ScalarSource, Texture};

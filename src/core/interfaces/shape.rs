@@ -1,0 +1,93 @@
+//! Geometry.
+
+use super::{LightPoint, SurfaceHit};
+use crate::accel::{Geometry, Hit, Ray};
+use crate::math::{Aabb, Transform, Vec2, Vec3};
+use crate::scene::ShapeGroup;
+use std::sync::Arc;
+
+/// A point sampled on a surface.
+#[derive(Clone, Copy, Debug)]
+pub struct AreaSample {
+    /// The point.
+    pub p: Vec3,
+    /// Bound on its absolute error on each axis.
+    pub p_error: Vec3,
+    /// Geometric unit normal.
+    pub n: Vec3,
+    /// Texture coordinates.
+    pub uv: Vec2,
+    /// Density: per unit area, or per solid angle where the method says so.
+    pub pdf: f32,
+}
+
+impl AreaSample {
+    /// The same point as seen from `from`: with direction and distance, and the density per solid angle there.
+    /// `None` where the surface is edge-on or the points coincide.
+    pub fn as_seen_from(&self, from: Vec3) -> Option<(LightPoint, f32)> {
+        let d = self.p - from;
+        let distance_squared = d.length_squared();
+        let distance = distance_squared.sqrt();
+        let d = d / distance;
+        let cos = d.dot(self.n).abs();
+        let pdf = self.pdf * distance_squared / cos;
+        (pdf.is_finite() && pdf > 0.0).then_some((LightPoint { p: self.p, n: self.n, uv: self.uv, d, distance }, pdf))
+    }
+}
+
+/// A shape in world space.
+pub trait Shape: Send + Sync {
+    /// What the acceleration structure is to hold.
+    fn geometry(&self) -> Geometry<'_>;
+
+    /// The box around it.
+    fn bounds(&self) -> Aabb;
+
+    /// Number of primitives.
+    fn primitive_count(&self) -> usize {
+        1
+    }
+
+    /// Surface area in square scene units.
+    fn area(&self) -> f32;
+
+    /// The hit in full: all of [`SurfaceHit`] but `shape`, `instance` and `wi`, which the scene fills in.
+    fn surface(&self, ray: &Ray, hit: &Hit) -> SurfaceHit;
+
+    /// A point uniform in area; `pdf` per unit area.
+    fn sample_area(&self, u2: Vec2) -> Option<AreaSample>;
+
+    /// A point as a light for `from`, with its density per solid angle there. By area unless the shape knows better.
+    fn sample_direct(&self, from: Vec3, u2: Vec2) -> Option<(LightPoint, Vec3, f32)> {
+        let sample = self.sample_area(u2)?;
+        let (point, pdf) = sample.as_seen_from(from)?;
+        Some((point, sample.p_error, pdf))
+    }
+
+    /// Density of [`sample_direct`](Self::sample_direct).
+    fn pdf_direct(&self, _from: Vec3, point: &LightPoint) -> f32 {
+        let pdf = point.distance * point.distance / (self.area() * point.d.dot(point.n).abs());
+        if pdf.is_finite() { pdf } else { 0.0 }
+    }
+
+    /// The surface point at texture coordinates: the hit (with `p`, `n`, `uv`, `dp_du`, `dp_dv`), if the
+    /// parametrisation can be inverted there.
+    fn at_uv(&self, _uv: Vec2) -> Option<SurfaceHit> {
+        None
+    }
+
+    /// Interpolated mesh attribute (`vertex_…` or `face_…`) at a hit, up to three channels.
+    fn attribute(&self, _name: &str, _hit: &SurfaceHit) -> Option<[f32; 3]> {
+        None
+    }
+
+    /// The group, if this shape is one: it is not rendered itself.
+    fn group(&self) -> Option<&Arc<ShapeGroup>> {
+        None
+    }
+
+    /// Group and placement, if this shape is an instance.
+    fn instance(&self) -> Option<(&ShapeGroup, &Transform)> {
+        None
+    }
+}

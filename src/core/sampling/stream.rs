@@ -1,0 +1,92 @@
+//! The numbers one pixel sample consumes.
+
+use super::Pcg32;
+use crate::math::{UVec2, Vec2};
+
+/// How many numbers a [`PointSet`] hands over per call.
+const BLOCK: usize = 8;
+
+/// A set of well-distributed points, asked for in blocks so that no virtual call is made per number.
+///
+/// A point of pixel sample `(pixel, sample)` is a pure function of these two, the seed and the dimension. One- and
+/// two-dimensional numbers are counted apart: a pair is stratified as a pair.
+pub trait PointSet: Send + Sync {
+    /// One-dimensional numbers `first..first + out.len()` of a pixel sample, each in [0, 1).
+    fn singles(&self, pixel: UVec2, sample: u32, first: u32, out: &mut [f32]);
+    /// Two-dimensional numbers `first..first + out.len()` of a pixel sample, each in [0, 1)².
+    fn pairs(&self, pixel: UVec2, sample: u32, first: u32, out: &mut [Vec2]);
+}
+
+/// The stream of numbers in [0, 1) that a pixel sample consumes.
+///
+/// Independent numbers come straight from a [`Pcg32`]; anything else comes from a [`PointSet`] in blocks.
+pub struct Stream<'a> {
+    pcg: Pcg32,
+    points: Option<&'a dyn PointSet>,
+    pixel: UVec2,
+    sample: u32,
+    singles: [f32; BLOCK],
+    pairs: [Vec2; BLOCK],
+    next_single: u32,
+    next_pair: u32,
+}
+
+impl<'a> Stream<'a> {
+    /// Independent numbers.
+    pub fn independent(pcg: Pcg32) -> Self {
+        Self::with(pcg, None, UVec2::ZERO, 0)
+    }
+
+    /// Numbers of a point set.
+    pub fn structured(points: &'a dyn PointSet, pixel: UVec2, sample: u32) -> Self {
+        Self::with(Pcg32::new(0, 0), Some(points), pixel, sample)
+    }
+
+    fn with(pcg: Pcg32, points: Option<&'a dyn PointSet>, pixel: UVec2, sample: u32) -> Self {
+        Stream {
+            pcg,
+            points,
+            pixel,
+            sample,
+            singles: [0.0; BLOCK],
+            pairs: [Vec2::ZERO; BLOCK],
+            next_single: 0,
+            next_pair: 0,
+        }
+    }
+
+    /// The next number.
+    #[inline]
+    pub fn next_1d(&mut self) -> f32 {
+        match self.points {
+            None => self.pcg.next_f32(),
+            Some(points) => {
+                let slot = self.next_single as usize % BLOCK;
+                if slot == 0 {
+                    points.singles(self.pixel, self.sample, self.next_single, &mut self.singles);
+                }
+                self.next_single += 1;
+                self.singles[slot]
+            }
+        }
+    }
+
+    /// The next pair; of independent numbers, x is drawn first.
+    #[inline]
+    pub fn next_2d(&mut self) -> Vec2 {
+        match self.points {
+            None => {
+                let x = self.pcg.next_f32();
+                Vec2::new(x, self.pcg.next_f32())
+            }
+            Some(points) => {
+                let slot = self.next_pair as usize % BLOCK;
+                if slot == 0 {
+                    points.pairs(self.pixel, self.sample, self.next_pair, &mut self.pairs);
+                }
+                self.next_pair += 1;
+                self.pairs[slot]
+            }
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! Maps from the unit square to the domains light transport needs, and their densities.
+
+use crate::math::{Vec2, Vec3, safe_sqrt};
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, FRAC_PI_4, PI, TAU};
+
+/// The unit square to the unit disk, area preserving up to a constant and continuous
+/// (Shirley and Chiu 1997, "A low distortion map between disk and square").
+#[inline]
+pub fn square_to_disk_concentric(u: Vec2) -> Vec2 {
+    let p = 2.0 * u - Vec2::ONE;
+    if p.x == 0.0 && p.y == 0.0 {
+        return Vec2::ZERO;
+    }
+    let (r, phi) =
+        if p.x.abs() < p.y.abs() { (p.y, FRAC_PI_2 - FRAC_PI_4 * (p.x / p.y)) } else { (p.x, FRAC_PI_4 * (p.y / p.x)) };
+    let (sin, cos) = phi.sin_cos();
+    Vec2::new(r * cos, r * sin)
+}
+
+/// The unit square to the unit disk by radius and angle: uniform in area.
+#[inline]
+pub fn square_to_disk_polar(u: Vec2) -> Vec2 {
+    let (sin, cos) = (TAU * u.x).sin_cos();
+    safe_sqrt(u.y) * Vec2::new(cos, sin)
+}
+
+/// Cosine-weighted direction about +z; density [`cosine_hemisphere_pdf`].
+#[inline]
+pub fn square_to_cosine_hemisphere(u: Vec2) -> Vec3 {
+    let p = square_to_disk_concentric(u);
+    p.extend(safe_sqrt(1.0 - p.length_squared()))
+}
+
+/// `max(cos θ, 0) / π` per solid angle.
+#[inline]
+pub fn cosine_hemisphere_pdf(v: Vec3) -> f32 {
+    v.z.max(0.0) * FRAC_1_PI
+}
+
+/// Uniform direction on the sphere; density `1/4π`.
+#[inline]
+pub fn square_to_sphere(u: Vec2) -> Vec3 {
+    let z = 1.0 - 2.0 * u.y;
+    let r = safe_sqrt(1.0 - z * z);
+    let (sin, cos) = (TAU * u.x).sin_cos();
+    Vec3::new(r * cos, r * sin, z)
+}
+
+/// `1/4π` per solid angle.
+pub const SPHERE_PDF: f32 = 0.25 * FRAC_1_PI;
+
+/// Uniform point of a triangle as barycentric coordinates of its second and third vertex.
+#[inline]
+pub fn square_to_triangle(u: Vec2) -> Vec2 {
+    let t = safe_sqrt(1.0 - u.x);
+    Vec2::new(1.0 - t, t * u.y)
+}
+
+/// Density of [`square_to_cone`] per solid angle, for a cone of the given cosine of its half angle.
+#[inline]
+pub fn cone_pdf(cos_cutoff: f32) -> f32 {
+    1.0 / (TAU * (1.0 - cos_cutoff))
+}
+
+/// Uniform direction in a cone about +z.
+#[inline]
+pub fn square_to_cone(u: Vec2, cos_cutoff: f32) -> Vec3 {
+    let p = square_to_disk_concentric(u);
+    let pn = p.length_squared();
+    let z = cos_cutoff + (1.0 - cos_cutoff) * (1.0 - pn);
+    let p = p * safe_sqrt((1.0 - cos_cutoff) * (2.0 - pn * (1.0 - cos_cutoff)));
+    p.extend(z)
+}
+
+/// The angle of a direction about +z, in [0, 2π).
+#[inline]
+pub fn azimuth(x: f32, y: f32) -> f32 {
+    let phi = y.atan2(x);
+    if phi < 0.0 { phi + 2.0 * PI } else { phi }
+}

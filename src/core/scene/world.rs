@@ -1,0 +1,334 @@
+//! A scene that can be rendered.
+
+use super::object::{BuiltSensor, BuiltShape};
+use crate::accel::{Accel, BuildOptions, Geometry, Hit, NO_INSTANCE, Ray};
+use crate::color::Rgb;
+use crate::interfaces::{Bsdf, Emitter, EmitterFlags, Integrator, LightPoint, LightSample, SurfaceHit};
+use crate::math::{ONE_MINUS_EPSILON, Transform, Vec2, Vec3};
+use crate::sampling::Discrete;
+use std::sync::Arc;
+
+/// Index of an emitter in its scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct EmitterId(pub u32);
+
+/// The emitter of a shape that has none, in the table of a [`Scene`].
+const NO_EMITTER: u32 = u32::MAX;
+
+/// Shapes that are placed many times by instances. Has no lights.
+pub struct ShapeGroup {
+    shapes: Vec<BuiltShape>,
+    accel: Arc<Accel>,
+}
+
+impl ShapeGroup {
+    /// Builds the acceleration structure over the shapes.
+    pub fn new(shapes: Vec<BuiltShape>) -> Result<Self, String> {
+        let accel = Arc::new(build_accel(&shapes)?);
+        Ok(ShapeGroup { shapes, accel })
+    }
+
+    /// The acceleration structure, in the group's own space.
+    pub fn accel(&self) -> &Arc<Accel> {
+        &self.accel
+    }
+
+    /// The shapes.
+    pub fn shapes(&self) -> &[BuiltShape] {
+        &self.shapes
+    }
+}
+
+fn build_accel(shapes: &[BuiltShape]) -> Result<Accel, String> {
+    let items: Vec<(u32, Geometry<'_>)> =
+        shapes.iter().enumerate().map(|(i, s)| (i as u32, s.shape.geometry())).collect();
+    Accel::build(&items, &BuildOptions::default())
+}
+
+/// A scene ready to render. Nothing in it changes any more.
+pub struct Scene {
+    shapes: Vec<BuiltShape>,
+    emitters: Vec<Arc<dyn Emitter>>,
+    /// For each shape its emitter, or [`NO_EMITTER`].
+    emitter_of_shape: Vec<u32>,
+    environment: Option<EmitterId>,
+    accel: Accel,
+    sensors: Vec<BuiltSensor>,
+    integrator: Option<Arc<dyn Integrator>>,
+    /// Chance of each emitter where they do not all have the same.
+    light_choice: Option<Discrete>,
+}
+
+impl Scene {
+    /// Puts a scene together. `emitters` are those that sit on no shape. Emitters are numbered shapes' first, then
+    /// the others, unless `order` (a shape index for a shape's light, or the index of a free emitter) says otherwise.
+    pub fn new(
+        shapes: Vec<BuiltShape>,
+        order: &[EmitterSource],
+        sensors: Vec<BuiltSensor>,
+        integrator: Option<Arc<dyn Integrator>>,
+    ) -> Result<Self, String> {
+        let accel = build_accel(&shapes)?;
+        let mut emitter_of_shape = vec![NO_EMITTER; shapes.len()];
+        let mut emitters: Vec<Arc<dyn Emitter>> = Vec::with_capacity(order.len());
+        let mut environment = None;
+        for source in order {
+            let id = emitters.len() as u32;
+            match source {
+                EmitterSource::Shape(shape) => {
+                    if let Some(emitter) = &shapes[*shape].emitter {
+                        emitter_of_shape[*shape] = id;
+                        emitters.push(emitter.clone());
+                    }
+                }
+                EmitterSource::Free(emitter) => {
+                    if emitter.flags().has(EmitterFlags::ENVIRONMENT) {
+                        environment = Some(EmitterId(id));
+                    }
+                    emitters.push(emitter.clone());
+                }
+            }
+        }
+        let uniform = emitters.iter().all(|e| e.sampling_weight() == 1.0);
+        let light_choice =
+            if uniform { None } else { Discrete::new(emitters.iter().map(|e| f64::from(e.sampling_weight()))) };
+        if !uniform && light_choice.is_none() {
+            // All weights are zero: no light is ever sampled, as if there were none to choose from.
+            return Err("the sampling weights of all emitters are zero".to_owned());
+        }
+        Ok(Scene { shapes, emitters, emitter_of_shape, environment, accel, sensors, integrator, light_choice })
+    }
+
+    /// The nearest hit.
+    #[inline]
+    pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        self.accel.intersect(ray)
+    }
+
+    /// Whether anything lies on the ray.
+    #[inline]
+    pub fn occluded(&self, ray: &Ray) -> bool {
+        self.accel.occluded(ray)
+    }
+
+    /// Whether the segment between two points is blocked. `from` has already been moved off its surface; `to` lies on
+    /// a surface with the given error bound and normal.
+    #[inline]
+    pub fn segment_occluded(&self, from: Vec3, to: Vec3) -> bool {
+        self.occluded(&Ray { o: from, d: to - from, t_min: 0.0, t_max: 1.0 })
+    }
+
+    /// The nearest hit in full.
+    #[inline]
+    pub fn intersect_surface(&self, ray: &Ray) -> Option<SurfaceHit> {
+        self.intersect(ray).map(|hit| self.surface(ray, &hit))
+    }
+
+    /// A hit in full.
+    pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfaceHit {
+        let mut surface = if hit.instance == NO_INSTANCE {
+            self.shapes[hit.shape as usize].shape.surface(ray, hit)
+        } else {
+            self.instance_surface(ray, hit)
+        };
+        surface.shape = hit.shape;
+        surface.prim = hit.prim;
+        surface.instance = hit.instance;
+        surface.wi = surface.frame.to_local(-ray.d);
+        surface
+    }
+
+    #[cold]
+    fn instance_surface(&self, ray: &Ray, hit: &Hit) -> SurfaceHit {
+        let instance = &self.shapes[hit.instance as usize].shape;
+        match instance.instance() {
+            Some((group, to_world)) => {
+                let local = Ray {
+                    o: to_world.inverse_point(ray.o),
+                    d: to_world.inverse_vector(ray.d),
+                    t_min: ray.t_min,
+                    t_max: ray.t_max,
+                };
+                let inner = group.shapes[hit.shape as usize].shape.surface(&local, hit);
+                transform_hit(&inner, to_world)
+            }
+            None => instance.surface(ray, hit),
+        }
+    }
+
+    fn built_shape(&self, hit: &SurfaceHit) -> &BuiltShape {
+        if hit.instance == NO_INSTANCE {
+            return &self.shapes[hit.shape as usize];
+        }
+        match self.shapes[hit.instance as usize].shape.instance() {
+            Some((group, _)) => &group.shapes[hit.shape as usize],
+            None => &self.shapes[hit.instance as usize],
+        }
+    }
+
+    /// The material at a hit.
+    #[inline]
+    pub fn bsdf(&self, hit: &SurfaceHit) -> &dyn Bsdf {
+        &*self.built_shape(hit).bsdf
+    }
+
+    /// The emitter of the shape that was hit.
+    #[inline]
+    pub fn emitter_at(&self, hit: &SurfaceHit) -> Option<EmitterId> {
+        if hit.instance != NO_INSTANCE {
+            return None;
+        }
+        match self.emitter_of_shape[hit.shape as usize] {
+            NO_EMITTER => None,
+            id => Some(EmitterId(id)),
+        }
+    }
+
+    /// An emitter.
+    #[inline]
+    pub fn emitter(&self, id: EmitterId) -> &dyn Emitter {
+        &*self.emitters[id.0 as usize]
+    }
+
+    /// All emitters.
+    pub fn emitters(&self) -> &[Arc<dyn Emitter>] {
+        &self.emitters
+    }
+
+    /// The emitter that surrounds the scene.
+    #[inline]
+    pub fn environment(&self) -> Option<EmitterId> {
+        self.environment
+    }
+
+    /// All shapes.
+    pub fn shapes(&self) -> &[BuiltShape] {
+        &self.shapes
+    }
+
+    /// All sensors.
+    pub fn sensors(&self) -> &[BuiltSensor] {
+        &self.sensors
+    }
+
+    /// The integrator the scene asks for.
+    pub fn integrator(&self) -> Option<&Arc<dyn Integrator>> {
+        self.integrator.as_ref()
+    }
+
+    /// The acceleration structure.
+    pub fn accel(&self) -> &Accel {
+        &self.accel
+    }
+
+    /// Centre and radius of the sphere around everything.
+    pub fn bounding_sphere(&self) -> (Vec3, f32) {
+        self.accel.bounds().bounding_sphere()
+    }
+
+    /// Chance with which [`choose_emitter`](Self::choose_emitter) picks an emitter.
+    #[inline]
+    pub fn emitter_pmf(&self, id: EmitterId) -> f32 {
+        match &self.light_choice {
+            None => 1.0 / self.emitters.len() as f32,
+            Some(distribution) => distribution.pmf(id.0),
+        }
+    }
+
+    /// Picks an emitter by the scene's weights and gives back what is left of `u`.
+    #[inline]
+    pub fn choose_emitter(&self, u: f32) -> Option<(EmitterId, f32, f32)> {
+        match (&self.light_choice, self.emitters.len()) {
+            (_, 0) => None,
+            (None, 1) => Some((EmitterId(0), 1.0, u)),
+            (None, count) => {
+                let scaled = u * count as f32;
+                let index = (scaled as u32).min(count as u32 - 1);
+                Some((EmitterId(index), 1.0 / count as f32, (scaled - index as f32).min(ONE_MINUS_EPSILON)))
+            }
+            (Some(distribution), _) => {
+                let (index, rest) = distribution.sample_reuse(u);
+                Some((EmitterId(index), distribution.pmf(index), rest))
+            }
+        }
+    }
+
+    /// Picks an emitter by the scene's weights and samples it as seen from `from`. The chance of the pick is part of
+    /// density and weight. Visibility is not tested.
+    #[inline]
+    pub fn sample_emitter(&self, from: Vec3, mut u2: Vec2) -> Option<(EmitterId, LightSample)> {
+        let (id, pmf, rest) = self.choose_emitter(u2.x)?;
+        u2.x = rest;
+        let mut sample = self.emitter(id).sample_direct(from, u2)?;
+        sample.pdf *= pmf;
+        sample.weight = sample.weight / pmf;
+        Some((id, sample))
+    }
+
+    /// Density with which [`sample_emitter`](Self::sample_emitter) gives this point of this emitter.
+    #[inline]
+    pub fn pdf_emitter(&self, id: EmitterId, from: Vec3, point: &LightPoint) -> f32 {
+        self.emitter(id).pdf_direct(from, point) * self.emitter_pmf(id)
+    }
+
+    /// Whether light from the sample reaches the hit.
+    #[inline]
+    pub fn visible(&self, hit: &SurfaceHit, light: &LightSample) -> bool {
+        !self.occluded(&shadow_ray(hit, light))
+    }
+
+    /// Radiance from where a ray goes that hits nothing.
+    #[inline]
+    pub fn background(&self, d: Vec3) -> Rgb {
+        self.environment.map_or(Rgb::BLACK, |id| self.emitter(id).background(d))
+    }
+}
+
+/// The ray from a hit to a light sample: it ends just before the error box of the light's point.
+#[inline]
+pub fn shadow_ray(hit: &SurfaceHit, light: &LightSample) -> Ray {
+    let point = &light.point;
+    if point.distance.is_infinite() {
+        return Ray { o: hit.origin_towards(point.d), d: point.d, t_min: 0.0, t_max: f32::INFINITY };
+    }
+    let o = hit.origin_towards(point.d);
+    let to = crate::math::error_bounds::offset_origin(point.p, light.p_error, point.n, o - point.p);
+    Ray { o, d: to - o, t_min: 0.0, t_max: 1.0 }
+}
+
+/// A hit of a group's shape in world space.
+fn transform_hit(hit: &SurfaceHit, to_world: &Transform) -> SurfaceHit {
+    use crate::math::{Frame, error_bounds::gamma};
+    let p = to_world.point(hit.p);
+    // Error of the point in the group, carried through the matrix, plus the rounding of the transform itself
+    // (Pharr, Jakob, Humphreys 2023, section 6.8.1).
+    let abs = |v: Vec3| {
+        let m = to_world.matrix;
+        m.x_axis.truncate().abs() * v.x.abs()
+            + m.y_axis.truncate().abs() * v.y.abs()
+            + m.z_axis.truncate().abs() * v.z.abs()
+    };
+    let p_error =
+        abs(hit.p_error) * (1.0 + gamma(3)) + (abs(hit.p) + to_world.matrix.w_axis.truncate().abs()) * gamma(3);
+    // A mirroring instance must not turn the normals of its group over: the reference does not either.
+    let n = to_world.normal(hit.n).normalize_or_zero();
+    let shading = to_world.normal(hit.frame.n).normalize_or_zero();
+    let dp_du = to_world.vector(hit.dp_du);
+    SurfaceHit {
+        p,
+        p_error,
+        n,
+        frame: Frame::from_tangent(shading, dp_du),
+        dp_du,
+        dp_dv: to_world.vector(hit.dp_dv),
+        ..*hit
+    }
+}
+
+/// Where an emitter of the scene comes from.
+pub enum EmitterSource {
+    /// The light of the shape with this index.
+    Shape(usize),
+    /// A light on no shape.
+    Free(Arc<dyn Emitter>),
+}
