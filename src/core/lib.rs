@@ -8,4 +8,5 @@
 //! The conventions that every module shares are stated once, in [`interfaces`].
 #![deny(unsafe_code)]
 
+pub mod accel;
 pub mod scene;
