@@ -8,4 +8,6 @@
 //! The conventions that every module shares are stated once, in [`interfaces`].
 #![deny(unsafe_code)]
 
+pub mod image;
+pub mod io;
 pub mod scene;
