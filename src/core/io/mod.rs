@@ -8,6 +8,7 @@
 pub mod limits;
 mod mesh;
 pub mod obj;
+pub mod output;
 pub mod ply;
 pub mod serialized;
 

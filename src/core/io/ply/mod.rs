@@ -39,7 +39,8 @@ fn read_with(bytes: &[u8], fast: bool) -> Result<TriangleMesh> {
     let mut rows = Rows::new(bytes, &header)?;
     let vertex_count = header.elements.iter().find(|element| element.name == "vertex").map_or(0, |e| e.count);
     let mut mesh = TriangleMesh::default();
-    for element in &header.elements {
+    // An element without properties has no data in binary files and blank lines in text, which are skipped anyway.
+    for element in header.elements.iter().filter(|element| !element.properties.is_empty()) {
         let count = rows.count(element)?;
         match element.name.as_str() {
             "vertex" => {
@@ -68,7 +69,6 @@ fn read_with(bytes: &[u8], fast: bool) -> Result<TriangleMesh> {
                 }
                 faces.finish(&mut mesh);
             }
-            _ if element.properties.is_empty() => {}
             _ => {
                 let mut row = Row::default();
                 (0..count).try_for_each(|_| rows.read(element, &mut row))?;
@@ -347,9 +347,10 @@ mod tests {
         assert_eq!(faces("3 0 1 2\n3 0 1 4"), "face 1 (from 0): index 4 is out of range, there are 4");
         assert_eq!(faces("3 0 1 -1"), "face 0 (from 0): index -1 is out of range, there are 4");
         assert_eq!(faces("2 0 1"), "face 0 (from 0) has only 2 corners");
-        assert_eq!(faces("3 0 1"), "line 13: no number for \"vertex_indices\"");
-        assert!(faces("200 0 1 2").starts_with("line 13: declares 200"));
-        assert!(faces("-3 0 1 2").starts_with("line 13: "));
+        assert_eq!(faces("3 0 1"), "line 14: declares 3 list entries of at least 2 bytes, but only 4 bytes are left");
+        assert_eq!(faces("3 0 1 x"), "line 14: no number for \"vertex_indices\"");
+        assert!(faces("200 0 1 2").starts_with("line 14: declares 200"));
+        assert!(faces("-3 0 1 2").starts_with("line 14: "));
         assert_eq!(faces(""), "the mesh has no faces");
         let nan = POINTS.replacen('1', "nan", 1);
         assert_eq!(error(ascii(XYZ, &nan, LIST, "3 0 1 2")), "vertex 1 (from 0): the position is not finite");
