@@ -1,6 +1,5 @@
 //! OpenEXR, through the `exr` crate.
 
-use std::collections::HashMap;
 use std::io::Cursor;
 use std::path::Path;
 
@@ -14,8 +13,10 @@ use ::exr::meta::MetaData;
 use ::exr::meta::attribute::{AttributeValue, LineOrder, SampleType, Text};
 use ::exr::meta::header::{Header, LayerAttributes};
 use half::f16;
+use rayon::prelude::*;
 
 use super::{Image, PixelData, ReadLimits, Samples};
+use crate::io::limits::{declared, shielded};
 use crate::io::{IoError, Result, output, read_bytes};
 
 pub use ::exr::compression::Compression;
@@ -97,18 +98,28 @@ fn to_exr(image: &Image, options: &ExrOptions) -> Result<ExrImage<Layer<AnyChann
         };
         list.push(AnyChannel::new(text(name)?, samples));
     }
-    let mut other = HashMap::new();
+    let mut attributes = LayerAttributes::default();
     for (name, value) in &options.attributes {
         let value = match value {
-            Attribute::Text(value) => AttributeValue::Text(Text::new_or_none(value).unwrap_or_else(|| "?".into())),
+            Attribute::Text(value) => {
+                let value = Text::new_or_none(value)
+                    .ok_or_else(|| IoError::new(format!("the attribute {name:?} has characters beyond Latin-1")))?;
+                // The crate keeps the standard names apart.
+                match name.as_str() {
+                    "software" => attributes.software_name = Some(value),
+                    "comments" => attributes.comments = Some(value),
+                    "owner" => attributes.owner = Some(value),
+                    _ => _ = attributes.other.insert(text(name)?, AttributeValue::Text(value)),
+                }
+                continue;
+            }
             Attribute::Number(value) => AttributeValue::F64(*value),
             Attribute::Integer(value) => {
                 i32::try_from(*value).map_or(AttributeValue::F64(*value as f64), AttributeValue::I32)
             }
         };
-        other.insert(text(name)?, value);
+        attributes.other.insert(text(name)?, value);
     }
-    let attributes = LayerAttributes { other, ..LayerAttributes::default() };
     let encoding =
         Encoding { compression: options.compression, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
     let size = (image.width as usize, image.height as usize);
@@ -138,6 +149,10 @@ pub fn read(path: &Path, limits: &ReadLimits) -> Result<ExrFile> {
 /// # Errors
 /// As [`read`].
 pub fn read_from_bytes(bytes: &[u8], limits: &ReadLimits) -> Result<ExrFile> {
+    shielded("the EXR file", || read_all(bytes, limits))
+}
+
+fn read_all(bytes: &[u8], limits: &ReadLimits) -> Result<ExrFile> {
     let reader = open(bytes)?;
     let headers = reader.headers();
     let size = headers[0].layer_size;
@@ -164,6 +179,10 @@ pub fn read_from_bytes(bytes: &[u8], limits: &ReadLimits) -> Result<ExrFile> {
             Some((name.to_string(), value))
         })
         .collect();
+    let own = &headers[0].own_attributes;
+    for (name, value) in [("software", &own.software_name), ("comments", &own.comments), ("owner", &own.owner)] {
+        attributes.extend(value.as_ref().map(|value| (name.to_owned(), Attribute::Text(value.to_string()))));
+    }
     attributes.sort_by(|a, b| a.0.cmp(&b.0));
     let data = load(reader, &wanted, bytes.len(), limits, |value| value, f16::to_f32)?;
     Ok(ExrFile { image: Image { width: size.0 as u32, height: size.1 as u32, channels, data }, attributes })
@@ -207,6 +226,10 @@ fn choose(headers: &[Header]) -> Choice {
 
 /// Reads the colour channels of a file, see [`super::read`].
 pub(super) fn read_color(bytes: &[u8], limits: &ReadLimits) -> Result<PixelData> {
+    shielded("the EXR file", || read_chosen(bytes, limits))
+}
+
+fn read_chosen(bytes: &[u8], limits: &ReadLimits) -> Result<PixelData> {
     let reader = open(bytes)?;
     let Choice { part, color, alpha, xyz } = choose(reader.headers());
     let header = &reader.headers()[part];
@@ -263,6 +286,9 @@ fn open(bytes: &[u8]) -> Result<BytesReader<'_>> {
     Ok(reader)
 }
 
+/// Chunks that are decompressed in parallel before their samples are put in place.
+const CHUNKS_AT_ONCE: usize = 64;
+
 /// Reads the `wanted` channels (part, channel), all of parts of the same size, interleaved in this order.
 fn load<T: Clone + Default>(
     reader: BytesReader<'_>,
@@ -283,10 +309,10 @@ fn load<T: Clone + Default>(
             return Err(IoError::new("deep and subsampled EXR files are not supported"));
         }
         // Every chunk takes at least its offset and its size.
-        crate::io::limits::declared(header.chunk_count as u64, 12, file_size, "chunks")?;
+        declared(header.chunk_count as u64, 12, file_size, "chunks")?;
     }
     let mut data = vec![T::default(); pixels * wanted.len()];
-    let insert = |meta: &MetaData, block: UncompressedBlock| -> ::exr::error::UnitResult {
+    let mut insert = |meta: &MetaData, block: UncompressedBlock| -> ::exr::error::UnitResult {
         let header = &meta.headers[block.index.layer];
         for LineRef { location, value } in block.lines(&header.channels) {
             let line = LineRef { location, value };
@@ -304,18 +330,25 @@ fn load<T: Clone + Default>(
         }
         Ok(())
     };
-    let chunks = reader
+    let mut chunks = reader
         .filter_chunks(false, |_, tile, block: BlockIndex| {
             tile.level_index == Vec2(0, 0) && wanted.iter().any(|&(part, _)| part == block.layer)
         })
         .map_err(damaged)?;
-    // Starting threads takes longer than a small picture.
-    if pixels < 1 << 18 {
-        chunks.decompress_sequential(false, insert).map_err(damaged)?;
-    } else {
-        chunks.decompress_parallel(false, insert).map_err(damaged)?;
+    // The crate's own parallel reading would abort the process if a damaged chunk made it panic in one of its threads.
+    let meta = chunks.meta_data().clone();
+    loop {
+        let batch = chunks.by_ref().take(CHUNKS_AT_ONCE).collect::<::exr::error::Result<Vec<_>>>().map_err(damaged)?;
+        if batch.is_empty() {
+            return Ok(data);
+        }
+        let blocks: Vec<_> = batch
+            .into_par_iter()
+            .map(|chunk| UncompressedBlock::decompress_chunk(chunk, &meta, false))
+            .collect::<::exr::error::Result<_>>()
+            .map_err(damaged)?;
+        blocks.into_iter().try_for_each(|block| insert(&meta, block)).map_err(damaged)?;
     }
-    Ok(data)
 }
 
 fn fill<'a, S, T: 'a>(
