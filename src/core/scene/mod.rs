@@ -7,6 +7,9 @@
 
 pub mod description;
 pub mod error;
+mod notes;
+pub mod resolve;
+pub mod xml;
 
 pub use description::{Description, Node, NodeId, ObjectKind, Parameter, SpectrumValue, Value};
 pub use error::{Location, SceneError, SceneErrors, did_you_mean};
