@@ -73,6 +73,18 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Description, SceneErro
     loader::load(loader::Main::File(path), options)
 }
 
+/// Reads a scene file and makes it ready to be instantiated: [`load`], [`resolve`](super::resolve::resolve),
+/// [`upgrade`](super::upgrade::upgrade).
+///
+/// # Errors
+/// As [`load`].
+pub fn load_upgraded(path: &Path, options: &LoadOptions) -> Result<Description, SceneErrors> {
+    let mut description = load(path, options)?;
+    super::resolve::resolve(&mut description)?;
+    super::upgrade::upgrade(&mut description);
+    Ok(description)
+}
+
 /// Reads a scene from `text`; `name` stands for the file name in messages. Files it names are looked up in the
 /// current directory and the given search path.
 ///
