@@ -44,21 +44,36 @@ fn become_sunsky(editor: &mut Editor, node: NodeId, on: &str, off: &str) -> Opti
     Some(format!("emitter \"{old}\" is read as \"sunsky\" with {off} 0"))
 }
 
-/// The sky of 0.x had +Y at the zenith, today's has +Z: a quarter turn about x is put before `to_world`. The direction
-/// of the sun was and is given in the world, so it stays.
-pub(super) fn sun_and_sky(editor: &mut Editor, node: NodeId) -> Option<String> {
-    if let Some(factor) = editor.take_number(node, "scale") {
-        for part in ["sun_scale", "sky_scale"] {
-            let own = editor.take_number(node, part).unwrap_or(1.0);
-            editor.set(node, part, Value::Float(own * factor));
-        }
+/// `scale` on `sunsky` goes into the scales of both parts.
+pub(super) fn scale_both(editor: &mut Editor, node: NodeId) -> Option<String> {
+    let factor = editor.take_number(node, "scale")?;
+    for part in ["sun_scale", "sky_scale"] {
+        let own = editor.take_number(node, part).unwrap_or(1.0);
+        editor.set(node, part, Value::Float(own * factor));
     }
-    if let Some(factor) = editor.take_number(node, "sun_radius_scale") {
-        editor.set(node, "sun_aperture", Value::Float(SUN_APERTURE * factor));
-    }
-    if let Some(turbidity) = editor.take_number(node, "turbidity") {
-        editor.set(node, "turbidity", Value::Float(turbidity.clamp(1.0, 10.0)));
-    }
+    Some("\"scale\" of emitter \"sunsky\" is multiplied into \"sun_scale\" and \"sky_scale\"".to_owned())
+}
+
+/// The size of the sun is an angle today.
+pub(super) fn sun_aperture(editor: &mut Editor, node: NodeId) -> Option<String> {
+    let factor = editor.take_number(node, "sun_radius_scale")?;
+    editor.set(node, "sun_aperture", Value::Float(SUN_APERTURE * factor));
+    Some("\"sun_radius_scale\" is read as \"sun_aperture\", in degrees".to_owned())
+}
+
+/// The sky model knows turbidities from 1 to 10.
+pub(super) fn turbidity(editor: &mut Editor, node: NodeId) -> Option<String> {
+    let given = number(&editor.scene.node(node).parameter("turbidity")?.value)?;
+    let possible = given.clamp(1.0, 10.0);
+    (given != possible).then(|| {
+        editor.set(node, "turbidity", Value::Float(possible));
+        format!("turbidity {given} is read as {possible}")
+    })
+}
+
+/// The sky of 0.x had +Y at the zenith and +Z in the south, today's has +Z and −Y: a quarter turn about x is put before
+/// `to_world`. The direction of the sun was and is given in the world, so it stays.
+pub(super) fn upright(editor: &mut Editor, node: NodeId) -> Option<String> {
     if !editor.is_ancient(node) {
         return None;
     }

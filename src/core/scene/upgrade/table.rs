@@ -89,8 +89,11 @@ pub(super) const TABLE: &[Row] = &[
     row(Emitter, &["area", "point", "spot", "directional", "constant"], With(emitters::fold_scale), ""),
     row(Emitter, &["sky"], With(emitters::only_the_sky), ""),
     row(Emitter, &["sun"], With(emitters::only_the_sun), ""),
-    row(Emitter, &["sunsky"], With(emitters::sun_and_sky), ""),
-    row(Emitter, &["sunsky"], Drop(&["stretch", "resolution", "sun_radius_scale"]), NOT_TODAY),
+    row(Emitter, &["sunsky"], With(emitters::scale_both), ""),
+    row(Emitter, &["sunsky"], With(emitters::sun_aperture), ""),
+    row(Emitter, &["sunsky"], With(emitters::turbidity), ""),
+    row(Emitter, &["sunsky"], With(emitters::upright), ""),
+    row(Emitter, &["sunsky"], Drop(&["stretch", "resolution"]), NOT_TODAY),
     row(Emitter, &["sunsky"], Whole(&["year", "month", "day"]), ""),
     row(Emitter, &["envmap"], Drop(&["gamma", "cache"]), NOT_TODAY),
 
