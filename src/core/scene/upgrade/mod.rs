@@ -14,6 +14,7 @@ mod emitters;
 mod materials;
 mod media;
 mod others;
+mod sun;
 mod table;
 mod textures;
 

@@ -131,19 +131,19 @@ fn emitters() {
         (
             "<emitter type='sunsky'><float name='sunRadiusScale' value='2'/><float name='scale' value='5'/><float name='skyScale' value='2'/>\
           <vector name='sunDirection' x='0' y='1' z='0'/><integer name='resolution' value='9'/><float name='stretch' value='1'/>\
-          <float name='turbidity' value='40'/><float name='year' value='2011'/></emitter>",
+          <float name='turbidity' value='40'/></emitter>",
             "<emitter type='sunsky'><float name='sun_aperture' value='1.0716'/><float name='sun_scale' value='5'/><float name='sky_scale' value='10'/>\
-          <vector name='sun_direction' x='0' y='1' z='0'/><float name='turbidity' value='10'/><integer name='year' value='2011'/>\
+          <vector name='sun_direction' x='0' y='1' z='0'/><float name='turbidity' value='10'/>\
           <transform name='to_world'><matrix value='1 0 0 0 0 0 1 0 0 -1 0 0 0 0 0 1'/></transform></emitter>",
         ),
         (
-            "<emitter type='sky'><float name='scale' value='2'/><transform name='toWorld'><translate x='5'/></transform></emitter>",
-            "<emitter type='sunsky'><float name='sun_scale' value='0'/><float name='sky_scale' value='2'/>\
+            "<emitter type='sky'><float name='scale' value='2'/><vector name='sunDirection' x='0' y='1' z='0'/><transform name='toWorld'><translate x='5'/></transform></emitter>",
+            "<emitter type='sunsky'><float name='sun_scale' value='0'/><float name='sky_scale' value='2'/><vector name='sun_direction' x='0' y='1' z='0'/>\
           <transform name='to_world'><matrix value='1 0 0 5 0 0 1 0 0 -1 0 0 0 0 0 1'/></transform></emitter>",
         ),
         (
-            "<emitter type='sun'/>",
-            "<emitter type='sunsky'><float name='sky_scale' value='0'/>\
+            "<emitter type='sun'><vector name='sunDirection' x='0' y='1' z='0'/><float name='hour' value='9'/></emitter>",
+            "<emitter type='sunsky'><float name='sky_scale' value='0'/><vector name='sun_direction' x='0' y='1' z='0'/>\
           <transform name='to_world'><matrix value='1 0 0 0 0 0 1 0 0 -1 0 0 0 0 0 1'/></transform></emitter>",
         ),
         (
@@ -163,6 +163,18 @@ fn the_sky_turns_upright() {
     assert_eq!(matrix.transform_vector3(glam::DVec3::Z), glam::DVec3::Y);
     let turn = glam::DMat4::from_rotation_x(-90f64.to_radians());
     assert!(matrix.abs_diff_eq(turn, 1e-12));
+}
+
+#[test]
+fn the_sun_of_a_place_and_time_turns_with_the_sky() {
+    let body = "<emitter type='sunsky'><float name='hour' value='9'/><integer name='minute' value='0'/>\
+                <transform name='toWorld'><rotate y='1' angle='90'/></transform></emitter>";
+    let scene = load("0.5.0", body);
+    let sky = scene.node(scene.children(scene.root).next().unwrap().1);
+    let Some(Value::Vector(direction)) = sky.parameter("sun_direction").map(|p| &p.value) else { panic!() };
+    let off = glam::DVec3::from_array(*direction).angle_between(glam::DVec3::new(0.093_954, 0.782_591, -0.615_405));
+    assert!(off.to_degrees() < 0.28, "{direction:?}");
+    assert!(sky.parameter("hour").is_none() && sky.parameter("minute").is_none());
 }
 
 #[test]
