@@ -1,6 +1,6 @@
 //! Lights.
 
-use super::super::description::{NodeId, Value};
+use super::super::description::{NodeId, ObjectKind, Value};
 use super::sun::PlaceAndTime;
 use super::{Editor, number, scaled};
 use glam::{DMat4, DVec3};
@@ -23,6 +23,26 @@ pub(super) fn fold_scale(editor: &mut Editor, node: NodeId) -> Option<String> {
     editor.take(node, "scale");
     editor.set(node, colour, value);
     Some(note)
+}
+
+/// A `sun` beside a `sky` goes into it: today a scene has one environment. What only the sun says about itself (its
+/// scale and size) is kept, and the rest is taken from the sky.
+pub(super) fn join_sun_to_sky(editor: &mut Editor, scene: NodeId) -> Option<String> {
+    let find = |plugin| {
+        let mut lights = editor.children(scene, ObjectKind::Emitter).into_iter();
+        lights.find(|(_, light)| editor.plugin(*light) == plugin && editor.is_old(*light))
+    };
+    let ((_, sky), (name, sun)) = (find("sky")?, find("sun")?);
+    let sky_scale = editor.take_number(sky, "scale").unwrap_or(1.0);
+    let sun_scale = editor.take_number(sun, "scale").unwrap_or(1.0);
+    editor.set(sky, "sky_scale", Value::Float(sky_scale));
+    editor.set(sky, "sun_scale", Value::Float(sun_scale));
+    if let Some(size) = editor.take(sun, "sun_radius_scale") {
+        editor.set(sky, "sun_radius_scale", size);
+    }
+    editor.scene.node_mut(sky).plugin = "sunsky".to_owned();
+    editor.take(scene, &name);
+    Some("emitters \"sun\" and \"sky\" are read as one \"sunsky\"".to_owned())
 }
 
 /// `sky` is `sunsky` without the sun.

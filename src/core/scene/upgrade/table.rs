@@ -2,7 +2,9 @@
 
 use super::super::description::{Node, NodeId, ObjectKind};
 use super::{Editor, emitters, materials, media, others, textures};
-use ObjectKind::{Bsdf, Emitter, Film, Integrator, Medium, Phase, Rfilter, Sampler, Sensor, Shape, Texture, Volume};
+use ObjectKind::{
+    Bsdf, Emitter, Film, Integrator, Medium, Phase, Rfilter, Sampler, Scene, Sensor, Shape, Texture, Volume,
+};
 use Rewrite::{Drop, Keep, Plugin, Real, Rename, Whole, With, Words};
 
 /// What is done to an object.
@@ -55,6 +57,8 @@ const fn row(kind: ObjectKind, plugins: &'static [&'static str], rewrite: Rewrit
 /// Rows for files of 0.x and 2.x.
 #[rustfmt::skip]
 pub(super) const TABLE: &[Row] = &[
+    row(Scene, ALL, With(emitters::join_sun_to_sky), ""),
+
     row(Integrator, &["irrcache", "adaptive", "multichannel"], With(others::unwrap_integrator), ""),
     row(Integrator, &["volpath_simple"], Plugin("volpath"), ""),
     row(Integrator, ALL, With(others::unknown_integrator), NEAREST),
