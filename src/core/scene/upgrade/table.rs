@@ -77,7 +77,7 @@ pub(super) const TABLE: &[Row] = &[
     row(Film, ALL, Words("pixel_format", &[("luminanceAlpha", "luminance_alpha"), ("spectrum", "rgb"), ("spectrumAlpha", "rgba")]), ""),
     row(Film, ALL, Words("component_format", &[("half", "float16"), ("float", "float32"), ("single", "float32"), ("uint", "uint32")]), ""),
     row(Film, ALL, With(others::file_format), "a film holds linear values"),
-    row(Film, ALL, Keep(&["width", "height", "crop_offset_x", "crop_offset_y", "crop_width", "crop_height", "sample_border", "component_format", "file_format", "pixel_format"]), NOT_TODAY),
+    row(Film, &["hdrfilm"], Keep(&["width", "height", "crop_offset_x", "crop_offset_y", "crop_width", "crop_height", "sample_border", "component_format", "file_format", "pixel_format"]), NOT_TODAY),
     row(Film, ALL, Whole(&["width", "height", "crop_offset_x", "crop_offset_y", "crop_width", "crop_height"]), ""),
 
     row(Rfilter, &["windowed-sinc", "windowed_sinc", "wsinc", "sinc"], Plugin("lanczos"), ""),
