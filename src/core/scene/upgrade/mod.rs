@@ -1,6 +1,6 @@
 //! Scenes written for the 0.x and 2.x versions of the language, brought to today's names.
 //!
-//! [`upgrade`] walks over a resolved [`Description`] and applies the rows of one [table](table): each names a kind of
+//! [`upgrade`] walks over a resolved [`Description`] and applies the rows of one table (`table.rs`): each names a kind of
 //! object, the plugins it concerns, and the rewrite. It is more forgiving than the reference, which changes the letter
 //! case of parameters and leaves the rest to the author. Whatever is rewritten is told in [`Description::notes`], once
 //! per row with a count. Objects from files of version 3.0 and later are left as they are, but for a few private
@@ -14,6 +14,7 @@ mod emitters;
 mod materials;
 mod media;
 mod others;
+mod sun;
 mod table;
 mod textures;
 

@@ -2,7 +2,9 @@
 
 use super::super::description::{Node, NodeId, ObjectKind};
 use super::{Editor, emitters, materials, media, others, textures};
-use ObjectKind::{Bsdf, Emitter, Film, Integrator, Medium, Phase, Rfilter, Sampler, Sensor, Shape, Texture, Volume};
+use ObjectKind::{
+    Bsdf, Emitter, Film, Integrator, Medium, Phase, Rfilter, Sampler, Scene, Sensor, Shape, Texture, Volume,
+};
 use Rewrite::{Drop, Keep, Plugin, Real, Rename, Whole, With, Words};
 
 /// What is done to an object.
@@ -55,6 +57,8 @@ const fn row(kind: ObjectKind, plugins: &'static [&'static str], rewrite: Rewrit
 /// Rows for files of 0.x and 2.x.
 #[rustfmt::skip]
 pub(super) const TABLE: &[Row] = &[
+    row(Scene, ALL, With(emitters::join_sun_to_sky), ""),
+
     row(Integrator, &["irrcache", "adaptive", "multichannel"], With(others::unwrap_integrator), ""),
     row(Integrator, &["volpath_simple"], Plugin("volpath"), ""),
     row(Integrator, ALL, With(others::unknown_integrator), NEAREST),
@@ -73,7 +77,7 @@ pub(super) const TABLE: &[Row] = &[
     row(Film, ALL, Words("pixel_format", &[("luminanceAlpha", "luminance_alpha"), ("spectrum", "rgb"), ("spectrumAlpha", "rgba")]), ""),
     row(Film, ALL, Words("component_format", &[("half", "float16"), ("float", "float32"), ("single", "float32"), ("uint", "uint32")]), ""),
     row(Film, ALL, With(others::file_format), "a film holds linear values"),
-    row(Film, ALL, Keep(&["width", "height", "crop_offset_x", "crop_offset_y", "crop_width", "crop_height", "sample_border", "component_format", "file_format", "pixel_format"]), NOT_TODAY),
+    row(Film, &["hdrfilm"], Keep(&["width", "height", "crop_offset_x", "crop_offset_y", "crop_width", "crop_height", "sample_border", "component_format", "file_format", "pixel_format"]), NOT_TODAY),
     row(Film, ALL, Whole(&["width", "height", "crop_offset_x", "crop_offset_y", "crop_width", "crop_height"]), ""),
 
     row(Rfilter, &["windowed-sinc", "windowed_sinc", "wsinc", "sinc"], Plugin("lanczos"), ""),

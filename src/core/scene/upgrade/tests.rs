@@ -1,5 +1,6 @@
 //! What each row of the table does, as pairs of old and new files that must come out the same.
 
+use super::super::write::{WriteOptions, to_xml};
 use super::super::{resolve, xml};
 use super::*;
 use std::path::{Path, PathBuf};
@@ -131,19 +132,19 @@ fn emitters() {
         (
             "<emitter type='sunsky'><float name='sunRadiusScale' value='2'/><float name='scale' value='5'/><float name='skyScale' value='2'/>\
           <vector name='sunDirection' x='0' y='1' z='0'/><integer name='resolution' value='9'/><float name='stretch' value='1'/>\
-          <float name='turbidity' value='40'/><float name='year' value='2011'/></emitter>",
+          <float name='turbidity' value='40'/></emitter>",
             "<emitter type='sunsky'><float name='sun_aperture' value='1.0716'/><float name='sun_scale' value='5'/><float name='sky_scale' value='10'/>\
-          <vector name='sun_direction' x='0' y='1' z='0'/><float name='turbidity' value='10'/><integer name='year' value='2011'/>\
+          <vector name='sun_direction' x='0' y='1' z='0'/><float name='turbidity' value='10'/>\
           <transform name='to_world'><matrix value='1 0 0 0 0 0 1 0 0 -1 0 0 0 0 0 1'/></transform></emitter>",
         ),
         (
-            "<emitter type='sky'><float name='scale' value='2'/><transform name='toWorld'><translate x='5'/></transform></emitter>",
-            "<emitter type='sunsky'><float name='sun_scale' value='0'/><float name='sky_scale' value='2'/>\
+            "<emitter type='sky'><float name='scale' value='2'/><vector name='sunDirection' x='0' y='1' z='0'/><transform name='toWorld'><translate x='5'/></transform></emitter>",
+            "<emitter type='sunsky'><float name='sun_scale' value='0'/><float name='sky_scale' value='2'/><vector name='sun_direction' x='0' y='1' z='0'/>\
           <transform name='to_world'><matrix value='1 0 0 5 0 0 1 0 0 -1 0 0 0 0 0 1'/></transform></emitter>",
         ),
         (
-            "<emitter type='sun'/>",
-            "<emitter type='sunsky'><float name='sky_scale' value='0'/>\
+            "<emitter type='sun'><vector name='sunDirection' x='0' y='1' z='0'/><float name='hour' value='9'/></emitter>",
+            "<emitter type='sunsky'><float name='sky_scale' value='0'/><vector name='sun_direction' x='0' y='1' z='0'/>\
           <transform name='to_world'><matrix value='1 0 0 0 0 0 1 0 0 -1 0 0 0 0 0 1'/></transform></emitter>",
         ),
         (
@@ -156,6 +157,18 @@ fn emitters() {
 }
 
 #[test]
+fn sun_and_sky_become_one() {
+    assert_reads(
+        "0.6.0",
+        "<emitter type='sun' id='sun'><float name='scale' value='3'/><float name='sunRadiusScale' value='2'/></emitter>\
+         <emitter type='sky'><vector name='sunDirection' x='0' y='1' z='0'/></emitter>",
+        "<emitter type='sunsky' name='_arg_1'><float name='sun_scale' value='3'/><float name='sky_scale' value='1'/>\
+         <float name='sun_aperture' value='1.0716'/><vector name='sun_direction' x='0' y='1' z='0'/>\
+         <transform name='to_world'><matrix value='1 0 0 0 0 0 1 0 0 -1 0 0 0 0 0 1'/></transform></emitter>",
+    );
+}
+
+#[test]
 fn the_sky_turns_upright() {
     let scene = load("0.6.0", "<emitter type='sky'/>");
     let sky = scene.children(scene.root).next().unwrap().1;
@@ -163,6 +176,18 @@ fn the_sky_turns_upright() {
     assert_eq!(matrix.transform_vector3(glam::DVec3::Z), glam::DVec3::Y);
     let turn = glam::DMat4::from_rotation_x(-90f64.to_radians());
     assert!(matrix.abs_diff_eq(turn, 1e-12));
+}
+
+#[test]
+fn the_sun_of_a_place_and_time_turns_with_the_sky() {
+    let body = "<emitter type='sunsky'><float name='hour' value='9'/><integer name='minute' value='0'/>\
+                <transform name='toWorld'><rotate y='1' angle='90'/></transform></emitter>";
+    let scene = load("0.5.0", body);
+    let sky = scene.node(scene.children(scene.root).next().unwrap().1);
+    let Some(Value::Vector(direction)) = sky.parameter("sun_direction").map(|p| &p.value) else { panic!() };
+    let off = glam::DVec3::from_array(*direction).angle_between(glam::DVec3::new(0.093_954, 0.782_591, -0.615_405));
+    assert!(off.to_degrees() < 0.28, "{direction:?}");
+    assert!(sky.parameter("hour").is_none() && sky.parameter("minute").is_none());
 }
 
 #[test]
@@ -338,6 +363,44 @@ fn notes_are_grouped() {
              today (a.xml:2:1 and 2 more)",
         ]
     );
+}
+
+/// Whatever is in a file, it is an error or a scene, and what is written of the scene loads again.
+#[test]
+fn damaged_files_do_no_harm() {
+    let sound = "<scene version='0.6.0'><default name='n' value='2'/><bsdf type='mixturebsdf' id='m'>\
+                 <string name='weights' value='0.5, $n'/><bsdf type='phong'/><bsdf type='coating'><ref id='d'/></bsdf>\
+                 </bsdf><bsdf type='bumpmap' id='d'><texture type='scale'><float name='scale' value='2'/>\
+                 <texture type='bitmap'><float name='uscale' value='$n'/></texture></texture><bsdf type='diffuse'/></bsdf>\
+                 <emitter type='sky'><transform name='toWorld'><lookAt origin='0 0 0' target='1 2 3' up='0 1 0'/>\
+                 </transform></emitter><shape type='cube'><medium type='homogeneous'><rgb name='sigmaS' value='1 2 3'/>\
+                 </medium><ref id='m'/><spectrum name='s' value='400:1, 500:&#50;'/></shape></scene>";
+    let mut random = 1u64;
+    let mut next = |below: usize| {
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (random >> 33) as usize % below
+    };
+    let mut loaded = 0;
+    for _ in 0..3000 {
+        let mut text: Vec<char> = sound.chars().collect();
+        for _ in 0..1 + next(3) {
+            let (at, other) = (next(text.len()), next(text.len()));
+            match next(4) {
+                0 => text[at] = text[other],
+                1 => drop(text.remove(at)),
+                2 => text.insert(at, ['<', '>', '\'', '$', '&', '0', '-', 'é'][other % 8]),
+                _ => drop(text.drain(at.min(other)..at.min(other) + (at.max(other) - at.min(other)).min(20))),
+            }
+        }
+        let text: String = text.into_iter().collect();
+        let Ok(mut scene) = xml::load_str(&text, "a.xml", &xml::LoadOptions::default()) else { continue };
+        resolve::resolve(&mut scene).unwrap();
+        upgrade(&mut scene);
+        let again = to_xml(&scene, &WriteOptions::default());
+        xml::load_str(&again, "b.xml", &xml::LoadOptions::default()).unwrap_or_else(|e| panic!("{e}\n{text}\n{again}"));
+        loaded += 1;
+    }
+    assert!(loaded > 100, "{loaded}");
 }
 
 /// Published scenes, where they lie beside the repository.

@@ -467,6 +467,10 @@ impl<'l, 'o> FileParser<'l, 'o> {
                 Some(Frame::Animation { first, .. }) => {
                     first.get_or_insert(matrix);
                 }
+                _ if !matrix.as_mat4().is_finite() => {
+                    let message = format!("the numbers in the transform \"{name}\" are too large");
+                    self.wrong(&at, (message, None));
+                }
                 _ => self.attach(Some(&name), Value::Transform(matrix), &at),
             },
             Some(Frame::Animation { name, first, at }) => {

@@ -100,6 +100,8 @@ fn transforms_apply_in_order() {
     let Value::Transform(m) = value(transform) else { panic!("not a transform") };
     assert!((m.transform_point3(DVec3::ZERO) - DVec3::new(0.0, 2.0, 0.0)).length() < 1e-12);
     assert_eq!(value("<transform name='t'/>"), Value::Transform(DMat4::IDENTITY));
+    let huge = messages("<transform name='t'><scale value='1e30'/><scale value='1e30'/></transform>");
+    assert_eq!(huge, ["a.xml:1:24: the numbers in the transform \"t\" are too large"]);
 }
 
 #[test]
