@@ -255,7 +255,7 @@ fn read_chosen(bytes: &[u8], limits: &ReadLimits) -> Result<PixelData> {
 /// Linear sRGB of CIE XYZ, both relative to D65 (IEC 61966-2-1:1999).
 fn xyz_to_rgb([x, y, z]: [f32; 3]) -> [f32; 3] {
     [
-        3.240_479 * x - 1.537_150 * y - 0.498_535 * z,
+        3.240_479 * x - 1.537_15 * y - 0.498_535 * z,
         -0.969_256 * x + 1.875_991 * y + 0.041_556 * z,
         0.055_648 * x - 0.204_043 * y + 1.057_311 * z,
     ]
