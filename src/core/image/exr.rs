@@ -380,6 +380,9 @@ fn fill<'a, S, T: 'a>(
 
 #[cfg(test)]
 mod tests {
+    use ::exr::meta::attribute::IntegerBounds;
+    use ::exr::meta::header::ImageAttributes;
+
     use super::*;
     use crate::io::damage::for_each_damaged;
     use crate::io::output::TestFolder;
@@ -457,6 +460,25 @@ mod tests {
         let xyz = color(&sample(1, 1, &["X", "Y", "Z"])).to_f32(false);
         let reference = [-1.329_426, 2.907_394, 2.819_495];
         xyz.iter().zip(reference).for_each(|(value, expected)| assert!((value - expected).abs() < 2e-5, "{xyz:?}"));
+    }
+
+    #[test]
+    fn displaced_tiled_and_many_part_files_load() {
+        let image = sample(70, 50, &["R", "G", "B"]);
+        let mut first = to_exr(&sample(70, 50, &["depth"]), &ExrOptions::default()).unwrap().layer_data;
+        let mut second = to_exr(&image, &ExrOptions::default()).unwrap().layer_data;
+        second.encoding.blocks = Blocks::Tiles(Vec2(32, 32));
+        (first.attributes.layer_name, second.attributes.layer_name) = (Some("one".into()), Some("two".into()));
+        (first.attributes.layer_position, second.attributes.layer_position) = (Vec2(-20, 7), Vec2(-20, 7));
+        let window = IntegerBounds::from_dimensions((100, 100));
+        let mut bytes = Cursor::new(Vec::new());
+        let layers = ExrImage::from_layers(ImageAttributes::new(window), vec![first, second]);
+        layers.write().to_buffered(&mut bytes).unwrap();
+        let bytes = bytes.into_inner();
+        let picture = read_color(&bytes, &ReadLimits::default()).unwrap();
+        assert_eq!((picture.width, picture.height, picture.samples), (70, 50, Samples::F32(image.data)));
+        let file = read_from_bytes(&bytes, &ReadLimits::default()).unwrap();
+        assert_eq!(file.image.channels, ["one.depth", "two.B", "two.G", "two.R"]);
     }
 
     #[test]
