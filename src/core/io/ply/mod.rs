@@ -9,7 +9,7 @@
 //!
 //! The header is read by the crate `ply-rs-bw`. Rows of any layout go through [`rows`], because the crate refuses
 //! numbers such as `.5` and `nan` in text and needs some hundred bytes of memory per row; binary files with the usual
-//! layout take the fixed-stride way of [`fast`], which is ten times as fast. The tests compare both with the crate.
+//! layout take the fixed-stride way of [`fast`]. The tests compare both with the crate.
 
 mod attributes;
 mod fast;
