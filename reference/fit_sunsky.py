@@ -23,10 +23,11 @@ XYZ_TO_RGB = np.array(
 RGB_TO_XYZ = np.linalg.inv(XYZ_TO_RGB)
 TURBIDITIES = np.arange(1, 11)
 # Where the simple sun is tabulated by the reference: seen as the kinks of its piecewise linear elevation dependence.
-NODES = np.linspace(2, 88, 30)
+NODES = np.linspace(2, 89, 30)
 LOW = np.array([0.02, 0.1, 0.2, 0.35, 0.5, 0.75, 1, 1.25, 1.5, 1.75])
-DEGREE = 6
+DEGREE = 8
 LIMB_DEGREE = 4
+REDDENING_DEGREE = 3
 MAX_REDDENING = 4.0
 REAL_APERTURE = 0.5358
 WIDE_APERTURE = 60.0
@@ -82,7 +83,7 @@ def fit_irradiance(simple, elevations, low):
         for c in range(3):
             e = np.concatenate([LOW, elevations])
             v = np.concatenate([low[t, :, c], simple[t, :, c]])
-            weight = np.clip(30 * v / brightest[c], 1e-3, 1) * np.where(e < NODES[0], 0.1, 1)
+            weight = np.clip(30 * v / brightest[c], 3e-3, 1) * np.where(e < NODES[0], 0.02, 1)
             good = v > 1e-9 * brightest[c]
             fitted = np.polynomial.chebyshev.chebfit(
                 coordinate(e[good]), np.log(v[good]), DEGREE, w=weight[good]
@@ -116,7 +117,7 @@ def fit_limb(coefficients):
             # The reference loses digits in the solid angle of the real disc: what it takes it for, not what it is,
             # turns its radiance into irradiance.
             q = reddening(mean)
-            basis = np.stack([x**i * q**j for i in range(LIMB_DEGREE + 1) for j in range(3)], axis=1)
+            basis = np.stack([x**i * q**j for i in range(LIMB_DEGREE + 1) for j in range(REDDENING_DEGREE + 1)], axis=1)
             lit = disc[:, 1] > 0
             for c in range(3):
                 values[c].append(disc[lit, c] * reference_disc(t, e) / mean[c])
@@ -129,7 +130,7 @@ def fit_limb(coefficients):
         v = np.concatenate(values[c])
         fitted = np.round(np.linalg.lstsq(rows * weights[:, None], v * weights, rcond=None)[0], 6)
         errors.append(np.abs(rows @ fitted - v) / v.max())
-        limb.append(fitted.reshape(LIMB_DEGREE + 1, 3))
+        limb.append(fitted.reshape(LIMB_DEGREE + 1, REDDENING_DEGREE + 1))
     errors = np.array(errors)
     print(f"limb darkening: largest error over centre {errors.max():.4%}, turbidity <= 6 and elevation >= 3: "
           f"{errors[:, bulk].max():.4%}, rms {np.sqrt((errors**2).mean()):.4%}", file=sys.stderr)
@@ -188,7 +189,7 @@ def main():
         rust(
             "LIMB",
             "Radiance over mean radiance: `[X, Y, Z][power of 1 − cos ψ][power of the reddening ln(X/Z)]`.",
-            f"[[[f32; 3]; {LIMB_DEGREE + 1}]; 3]",
+            f"[[[f32; {REDDENING_DEGREE + 1}]; {LIMB_DEGREE + 1}]; 3]",
             limb,
         )
     )

@@ -7,7 +7,7 @@ use lucerna_core::sampling::warp;
 use std::f32::consts::TAU;
 
 /// Elevation in degrees of the first and last node of the uniform sun; in between it is linear.
-const NODES: (f32, f32) = (2.0, 88.0);
+const NODES: (f32, f32) = (2.0, 89.0);
 /// Number of intervals between the nodes.
 const INTERVALS: f32 = 29.0;
 /// Largest reddening that the limb darkening was fitted to.
@@ -158,13 +158,9 @@ mod tests {
                 let [r, g, b] = golden::SUN[t][e];
                 let expected = Rgb::new(r, g, b);
                 let found = sun_at(turbidity, degrees, REAL, false).irradiance();
-                // A sun of 1/1000 of the brightest is lost in the sky around it.
-                if r > 1e-3 * brightest {
-                    let error = difference(found, expected);
-                    assert!(error < 1.5e-3, "turbidity {turbidity}, {degrees}°: {found:?}, {expected:?}: {error}");
-                } else {
-                    assert!(difference(found, expected) < 0.02, "{found:?} {expected:?}");
-                }
+                // A sun of 1/1000 of the brightest is lost in the sky around it: there the absolute error counts.
+                let error = difference(found, expected) * (r / (1e-3 * brightest)).min(1.0);
+                assert!(error < 1.5e-3, "turbidity {turbidity}, {degrees}°: {found:?}, {expected:?}: {error}");
             }
         }
     }
@@ -194,13 +190,16 @@ mod tests {
             assert!(difference(uniform.radiance(uniform.frame.n) * uniform.solid_angle(), uniform.irradiance()) < 1e-5);
         }
         let darkened = sun_at(3.0, 60.0, REAL, true);
-        let n = 64;
+        let n = 256;
         let mut mean = Rgb::BLACK;
         for i in 0..n * n {
             let u = Vec2::new(((i % n) as f32 + 0.5) / n as f32, ((i / n) as f32 + 0.5) / n as f32);
             mean += darkened.radiance(darkened.sample(u)) / (n * n) as f32;
         }
-        assert!(difference(mean * darkened.solid_angle(), darkened.irradiance()) < 2e-3);
+        // The two suns of the reference renderer differ by this much.
+        let expected = darkened.irradiance() * Rgb::new(1.00103, 1.00124, 1.00160);
+        let error = difference(mean * darkened.solid_angle(), expected);
+        assert!(error < 1e-3, "{error}");
     }
 
     #[test]
