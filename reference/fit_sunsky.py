@@ -85,9 +85,7 @@ def fit_irradiance(simple, elevations, low):
             v = np.concatenate([low[t, :, c], simple[t, :, c]])
             weight = np.clip(30 * v / brightest[c], 3e-3, 1) * np.where(e < NODES[0], 0.02, 1)
             good = v > 1e-9 * brightest[c]
-            fitted = np.polynomial.chebyshev.chebfit(
-                coordinate(e[good]), np.log(v[good]), DEGREE, w=weight[good]
-            )
+            fitted = np.polynomial.chebyshev.chebfit(coordinate(e[good]), np.log(v[good]), DEGREE, w=weight[good])
             coefficients[t, c] = np.polynomial.chebyshev.cheb2poly(fitted)
     return np.round(coefficients, 5)
 
@@ -114,8 +112,6 @@ def fit_limb(coefficients):
             if mean[1] < 1e-2 * evaluate(coefficients, 88.0)[0, 0, 1]:
                 continue
             disc = across_the_disc(t, e, mu)
-            # The reference loses digits in the solid angle of the real disc: what it takes it for, not what it is,
-            # turns its radiance into irradiance.
             q = reddening(mean)
             basis = np.stack([x**i * q**j for i in range(LIMB_DEGREE + 1) for j in range(REDDENING_DEGREE + 1)], axis=1)
             lit = disc[:, 1] > 0
@@ -138,7 +134,11 @@ def fit_limb(coefficients):
 
 
 def reference_disc(turbidity, elevation):
-    """Solid angle by which the reference weighs the real disc, from how radiance changes with the aperture."""
+    """Solid angle the reference takes the real disc for, from how radiance changes with the aperture.
+
+    It loses digits there (1 - cos in single precision): this number, not the exact one, turns its radiance into
+    irradiance.
+    """
     d = sun_direction(elevation)
     real, wide = (
         radiance([d], turbidity=turbidity, sun_direction=d, sun_aperture=a)[0, 0] for a in (REAL_APERTURE, WIDE_APERTURE)

@@ -66,7 +66,7 @@ impl PlaceAndTime {
     /// Days since noon of 1 January 2000, universal time.
     ///
     /// The day number is that of Fliegel and Van Flandern 1968. The reference renderer keeps it in single precision,
-    /// which near day 2 451 545 knows quarters of a day only; the sun is off by up to 0.1° for that, here as there, so
+    /// which near day 2 451 545 knows quarters of a day only; the sun is some hundredths of a degree off for that, here as there, so
     /// that shadows fall on the same pixels.
     fn days_since_2000(&self, hours: f64) -> f64 {
         let shift = (self.month - 14) / 12;

@@ -154,7 +154,7 @@ mod tests {
                 }
             }
         }
-        assert!(worst < 1e-3, "{worst}");
+        assert!(worst < 2e-5, "{worst}");
     }
 
     #[test]
