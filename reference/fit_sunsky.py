@@ -191,7 +191,8 @@ def main():
             "Radiance over mean radiance: `[X, Y, Z][power of 1 − cos ψ][power of the reddening ln(X/Z)]`.",
             f"[[[f32; {REDDENING_DEGREE + 1}]; {LIMB_DEGREE + 1}]; 3]",
             limb,
-        )
+        ),
+        end="",
     )
 
 

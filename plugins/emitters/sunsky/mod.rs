@@ -2,9 +2,10 @@
 //!
 //! An environment of two parts. The sky is the model of Hosek and Wilkie 2012, "An analytic model for full spectral
 //! sky-dome radiance"; its data set is that of the authors (3-clause BSD). The sun is the one of Hosek and Wilkie 2013,
-//! "Adding a solar-radiance function to the Hošek–Wilkie skylight model", by a fit of our own (irradiance to 0.03 %, limb to 0.3 %). Radiance is in
-//! W·m⁻²·sr⁻¹·nm⁻¹ divided by the integral of the CIE ȳ function, and is not clipped: a low sun may be out of gamut and
-//! have a negative blue. Below the horizon everything is black, and so is all of it once the sun has set.
+//! "Adding a solar-radiance function to the Hošek–Wilkie skylight model", by a fit of our own (irradiance to 0.03 %,
+//! limb to 0.3 %). Radiance is in W·m⁻²·sr⁻¹·nm⁻¹ divided by the integral of the CIE ȳ function, and is not clipped: a
+//! low sun may be out of gamut and have a negative blue. Below the horizon everything is black, and so is all of it once
+//! the sun has set.
 //!
 //! The zenith is +z. The sun stands where `sun_direction` says (world space), or where it is at a place and time: then
 //! +x is south and +y is west, before `to_world`.
