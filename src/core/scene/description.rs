@@ -236,6 +236,20 @@ pub struct Description {
 }
 
 impl Description {
+    /// A description of one object alone.
+    pub fn of(node: Node) -> Self {
+        Description {
+            nodes: vec![node],
+            root: NodeId(0),
+            version: [3, 0, 0],
+            search_path: Vec::new(),
+            notes: Vec::new(),
+            warnings: Vec::new(),
+            confined_to: None,
+            file_versions: Vec::new(),
+        }
+    }
+
     /// A node.
     pub fn node(&self, id: NodeId) -> &Node {
         &self.nodes[id.0 as usize]
