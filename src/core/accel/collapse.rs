@@ -67,12 +67,11 @@ impl Choice {
         best.cost[0] = as_node;
         best.left[0] = FEWER;
         let as_pack = PACK_COST * area;
-        if best.triangles && count as usize <= WIDTH && !(as_pack > as_node) {
+        if best.triangles && count as usize <= WIDTH && as_pack <= as_node {
             best.cost[0] = as_pack;
             best.left[0] = LEAF;
         }
-        for j in 1..WIDTH {
-            let (cost, k) = shared[j];
+        for (j, (cost, k)) in shared.into_iter().enumerate().skip(1) {
             (best.cost[j], best.left[j]) = if cost < best.cost[j - 1] { (cost, k) } else { (best.cost[j - 1], FEWER) };
         }
         best
