@@ -78,7 +78,8 @@ impl Choice {
     }
 }
 
-/// Collapses `tree`, which must not be empty. `pack_of` tells triangles (`None`) from the others (`Some`: their index).
+/// Collapses `tree`, which must not be empty. `analytic` tells triangles (`None`) from the others
+/// (`Some`: their index).
 pub fn collapse(tree: &BinaryTree, frame: &Frame, analytic: &(dyn Fn(u32) -> Option<u32> + Sync)) -> Collapsed {
     let mut choices = vec![Choice::UNSET; tree.nodes.len()];
     let (root, block) = choices.split_at_mut(1);

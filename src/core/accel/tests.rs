@@ -242,6 +242,46 @@ fn hits_at_every_scale_equal_brute_force() {
 }
 
 #[test]
+fn hc_g03_rays_leaving_a_triangle_by_its_error_bound_do_not_return() {
+    let mut random = Random(3);
+    let gamma_7 = 7.0 * f32::EPSILON * 0.5 / (1.0 - 7.0 * f32::EPSILON * 0.5);
+    let mut left = 0;
+    while left < 100_000 {
+        let [size, place] = [0; 2].map(|_| 10.0_f32.powf(random.signed() * 8.0));
+        let offset = random.vector() * place;
+        let corners = [0; 3].map(|_| offset + random.vector() * size);
+        let target = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let o = target + random.vector() * size * 10.0;
+        if !is_hittable(corners) {
+            continue;
+        }
+        let Some(hit) = Shear::new(o, target - o).intersect(corners.map(<[f32; 3]>::from)) else { continue };
+        let parts = [corners[0] * (1.0 - hit.u - hit.v), corners[1] * hit.u, corners[2] * hit.v];
+        let p = parts[0] + parts[1] + parts[2];
+        let error = (parts[0].abs() + parts[1].abs() + parts[2].abs()) * gamma_7;
+        let [a, b, c] = corners.map(|p| p.as_dvec3());
+        let normal = (b - a).cross(c - a).normalize();
+        assert!((p.as_dvec3() - a).dot(normal).abs() <= error.as_dvec3().dot(normal.abs()), "{corners:?} {hit:?}");
+
+        // Off the plane by the error bound, then outwards by the rounding of that sum (Pharr et al. 2023, 6.8.6).
+        let n = normal.as_vec3();
+        let moved = p + n * (n.abs().dot(error) * (1.0 + 4.0 * f32::EPSILON));
+        let start = Vec3::from_array([0, 1, 2].map(|axis| match n[axis] {
+            x if x > 0.0 => moved[axis].next_up(),
+            x if x < 0.0 => moved[axis].next_down(),
+            _ => moved[axis],
+        }));
+        for _ in 0..4 {
+            let mut d = random.vector();
+            d *= d.dot(n).signum();
+            let again = Shear::new(start, d).intersect(corners.map(<[f32; 3]>::from));
+            assert!(again.is_none_or(|hit| hit.t <= 0.0), "{corners:?} {start:?} {d:?} {again:?}");
+            left += 1;
+        }
+    }
+}
+
+#[test]
 fn hc_g05_a_room_far_away_has_no_holes() {
     let offset = Vec3::splat(1e5);
     let mut room = Mesh::default();

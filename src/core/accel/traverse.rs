@@ -8,7 +8,7 @@
 //! # Why no box is missed
 //!
 //! With u = 2⁻²⁴, planes p and origin o relative to the middle of the scene, and S = max |p| + |o|: moving o there is wrong
-//! by u S; the plane's distance (p − o) / d, computed as p · (1/d) − o · (1/d), is off by what moving p by 3 u S would do; and
+//! by u S; the plane's distance (p − o) / d, computed as p · (1/d) − o · (1/d), is off by what moving p by 4 u S would do; and
 //! the triangle test accepts points up to 6 u S beside a triangle, since it rounds the sheared vertices. The rounding of t
 //! adds u S. Each plane is therefore moved outwards by 12 u S, in the constant o · (1/d), at no cost. A direction component
 //! below 10⁻¹⁸ of the largest counts as that; over the length of the scene this shifts the ray by much less than u S.
@@ -67,7 +67,7 @@ impl Path {
     #[must_use]
     pub fn fastest() -> Self {
         #[cfg(target_arch = "x86_64")]
-        if ["avx2", "fma", "bmi1", "bmi2", "lzcnt", "popcnt"].iter().all(|f| avx2::has(f)) {
+        if avx2::is_available() {
             return Self(Instructions::Avx2);
         }
         Self::PORTABLE
@@ -207,16 +207,13 @@ mod avx2 {
     use super::{Beam, Found, Kernel, Node, Pack, Ray, Shear, Tree, WIDTH, walk};
     use std::arch::x86_64::*;
 
-    pub fn has(feature: &str) -> bool {
-        match feature {
-            "avx2" => is_x86_feature_detected!("avx2"),
-            "fma" => is_x86_feature_detected!("fma"),
-            "bmi1" => is_x86_feature_detected!("bmi1"),
-            "bmi2" => is_x86_feature_detected!("bmi2"),
-            "lzcnt" => is_x86_feature_detected!("lzcnt"),
-            "popcnt" => is_x86_feature_detected!("popcnt"),
-            _ => false,
-        }
+    pub fn is_available() -> bool {
+        is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("fma")
+            && is_x86_feature_detected!("bmi1")
+            && is_x86_feature_detected!("bmi2")
+            && is_x86_feature_detected!("lzcnt")
+            && is_x86_feature_detected!("popcnt")
     }
 
     #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
@@ -388,6 +385,11 @@ fn walk<K: Kernel, const ANY: bool>(tree: &Tree, ray: &Ray) -> Option<Found> {
                 }
                 let entry = u64::from(near[slot].to_bits()) << 32 | u64::from(child.0);
                 if ANY { stack.push(entry) } else { stack.insert(base, entry) }
+            }
+            if stack.len > base {
+                stack.len -= 1;
+                word = Word(stack.get(stack.len) as u32);
+                continue;
             }
         } else if word.is_primitive() {
             let (id, primitive) = &tree.primitives[word.index()];

@@ -34,7 +34,7 @@ struct Reference {
 }
 
 impl Reference {
-    /// Twice the centroid, but finite for every finite box.
+    /// The middle of the box, finite for every finite box.
     fn centroid(&self) -> Vec3A {
         self.min * 0.5 + self.max * 0.5
     }
