@@ -151,7 +151,8 @@ trait Kernel {
     /// The processor has the instructions of the kernel.
     unsafe fn candidates(beam: &Beam, pack: &Pack) -> u32;
 
-    /// Asks for two cache lines.
+    /// Asks for the first two cache lines of an item, which need not exist.
+    #[inline(always)]
     fn prefetch<T>(_: &[T], _index: usize) {}
 }
 
@@ -373,22 +374,20 @@ fn walk<K: Kernel, const ANY: bool>(tree: &Tree, ray: &Ray) -> Option<Found> {
                 word = node.children[mask.trailing_zeros() as usize];
                 continue;
             }
-            let base = stack.len;
-            while mask != 0 {
-                let slot = mask.trailing_zeros() as usize & (WIDTH - 1);
-                mask &= mask - 1;
-                let child = node.children[slot];
-                if child.is_node() {
-                    K::prefetch(&tree.nodes, child.index());
-                } else {
-                    K::prefetch(&tree.packs, child.index());
+            if mask != 0 {
+                let mut nearest = take::<K>(tree, node, &near, &mut mask);
+                let base = stack.len;
+                while mask != 0 {
+                    let other = take::<K>(tree, node, &near, &mut mask);
+                    if ANY {
+                        stack.push(nearest);
+                        nearest = other;
+                    } else {
+                        stack.insert(base, nearest.max(other));
+                        nearest = nearest.min(other);
+                    }
                 }
-                let entry = u64::from(near[slot].to_bits()) << 32 | u64::from(child.0);
-                if ANY { stack.push(entry) } else { stack.insert(base, entry) }
-            }
-            if stack.len > base {
-                stack.len -= 1;
-                word = Word(stack.get(stack.len) as u32);
+                word = Word(nearest as u32);
                 continue;
             }
         } else if word.is_primitive() {
@@ -430,6 +429,20 @@ fn walk<K: Kernel, const ANY: bool>(tree: &Tree, ray: &Ray) -> Option<Found> {
             }
         }
     }
+}
+
+/// The next child of a node in `mask`, which must not be 0, as an entry of the stack. Asks for its memory.
+#[inline(always)]
+fn take<K: Kernel>(tree: &Tree, node: &Node, near: &[f32; WIDTH], mask: &mut u32) -> u64 {
+    let slot = mask.trailing_zeros() as usize & (WIDTH - 1);
+    *mask &= *mask - 1;
+    let child = node.children[slot];
+    if child.is_node() {
+        K::prefetch(&tree.nodes, child.index());
+    } else {
+        K::prefetch(&tree.packs, child.index());
+    }
+    u64::from(near[slot].to_bits()) << 32 | u64::from(child.0)
 }
 
 struct Best {
