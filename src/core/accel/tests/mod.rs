@@ -1,7 +1,10 @@
 //! The tree against brute force, and the hard cases of geometry.
 
+mod analytic;
+
 use super::triangle::{Shear, is_hittable};
 use super::*;
+use analytic::Ball;
 use std::time::Instant;
 
 const ALL: [BuildOptions; 4] = [
@@ -135,14 +138,14 @@ fn brute_force(meshes: &[&Mesh], ray: &Ray) -> Option<Hit> {
 
 /// Rays that begin around a scene in [−1, 1]³ and look into it; some along axes, some of finite length.
 fn test_ray(i: usize, random: &mut Random) -> Ray {
-    let o = random.vector() * if i % 3 == 0 { 1.0 } else { 4.0 };
-    let mut d = random.vector() - o * if i % 3 == 0 { 0.0 } else { 0.5 };
-    if i % 5 == 0 {
+    let o = random.vector() * if i.is_multiple_of(3) { 1.0 } else { 4.0 };
+    let mut d = random.vector() - o * if i.is_multiple_of(3) { 0.0 } else { 0.5 };
+    if i.is_multiple_of(5) {
         let axis = i / 5 % 3;
         d = Vec3::from_array(std::array::from_fn(|a| if a == axis { d[axis] } else { 0.0 }));
     }
-    let t_max = if i % 7 == 0 { random.signed().abs() } else { f32::INFINITY };
-    Ray { o, d, t_min: if i % 11 == 0 { 0.1 } else { 0.0 }, t_max }
+    let t_max = if i.is_multiple_of(7) { random.signed().abs() } else { f32::INFINITY };
+    Ray { o, d, t_min: if i.is_multiple_of(11) { 0.1 } else { 0.0 }, t_max }
 }
 
 #[test]
@@ -242,6 +245,46 @@ fn hits_at_every_scale_equal_brute_force() {
 }
 
 #[test]
+fn hc_g03_rays_leaving_a_triangle_by_its_error_bound_do_not_return() {
+    let mut random = Random(3);
+    let gamma_7 = 7.0 * f32::EPSILON * 0.5 / (1.0 - 7.0 * f32::EPSILON * 0.5);
+    let mut left = 0;
+    while left < 100_000 {
+        let [size, place] = [0; 2].map(|_| 10.0_f32.powf(random.signed() * 8.0));
+        let offset = random.vector() * place;
+        let corners = [0; 3].map(|_| offset + random.vector() * size);
+        let target = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let o = target + random.vector() * size * 10.0;
+        if !is_hittable(corners) {
+            continue;
+        }
+        let Some(hit) = Shear::new(o, target - o).intersect(corners.map(<[f32; 3]>::from)) else { continue };
+        let parts = [corners[0] * (1.0 - hit.u - hit.v), corners[1] * hit.u, corners[2] * hit.v];
+        let p = parts[0] + parts[1] + parts[2];
+        let error = (parts[0].abs() + parts[1].abs() + parts[2].abs()) * gamma_7;
+        let [a, b, c] = corners.map(|p| p.as_dvec3());
+        let normal = (b - a).cross(c - a).normalize();
+        assert!((p.as_dvec3() - a).dot(normal).abs() <= error.as_dvec3().dot(normal.abs()), "{corners:?} {hit:?}");
+
+        // Off the plane by the error bound, then outwards by the rounding of that sum (Pharr et al. 2023, 6.8.6).
+        let n = normal.as_vec3();
+        let moved = p + n * (n.abs().dot(error) * (1.0 + 4.0 * f32::EPSILON));
+        let start = Vec3::from_array([0, 1, 2].map(|axis| match n[axis] {
+            x if x > 0.0 => moved[axis].next_up(),
+            x if x < 0.0 => moved[axis].next_down(),
+            _ => moved[axis],
+        }));
+        for _ in 0..4 {
+            let mut d = random.vector();
+            d *= d.dot(n).signum();
+            let again = Shear::new(start, d).intersect(corners.map(<[f32; 3]>::from));
+            assert!(again.is_none_or(|hit| hit.t <= 0.0), "{corners:?} {start:?} {d:?} {again:?}");
+            left += 1;
+        }
+    }
+}
+
+#[test]
 fn hc_g05_a_room_far_away_has_no_holes() {
     let offset = Vec3::splat(1e5);
     let mut room = Mesh::default();
@@ -289,12 +332,17 @@ fn hc_g09_coincident_triangles_build_quickly_and_are_traversed() {
     let scattered = Mesh::soup(count, 0.02, &mut random);
     let one = Mesh { positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]; count] };
     for options in [ALL[0], ALL[2]] {
+        // The quickest of three, since other tests run at the same time.
         let time = |mesh: &Mesh| {
-            let start = Instant::now();
-            (build(&[mesh], &options), start.elapsed())
+            let once = || {
+                let start = Instant::now();
+                let accel = Accel::build(&[(0, mesh.geometry())], &options);
+                (start.elapsed(), accel.is_ok())
+            };
+            [once(), once(), once()].into_iter().min().map(|(elapsed, _)| elapsed)
         };
-        let (_, usual) = time(&scattered);
-        let (accel, coincident) = time(&one);
+        let (usual, coincident) = (time(&scattered).unwrap(), time(&one).unwrap());
+        let accel = build(&[&one], &options);
         assert!(coincident < usual * 4, "{coincident:?} against {usual:?}");
         let hit = accel.intersect(&Ray::new(Vec3::new(0.25, 0.25, 1.0), Vec3::NEG_Z)).unwrap();
         assert_eq!((hit.t, hit.prim), (1.0, 0));
@@ -442,105 +490,4 @@ fn builds_are_the_same_for_any_number_of_threads() {
         });
         assert!(one == two);
     }
-}
-
-/// A sphere, solved in `f64`.
-struct Ball {
-    center: Vec3,
-    radius: f32,
-}
-
-impl Primitive for Ball {
-    fn bounds(&self) -> Aabb {
-        let reach = Vec3::splat(self.radius * (1.0 + 4.0 * f32::EPSILON));
-        Aabb { min: self.center - reach, max: self.center + reach }
-    }
-
-    fn intersect(&self, ray: &Ray) -> Option<PrimHit> {
-        let [o, d] = [(ray.o.as_dvec3() - self.center.as_dvec3()), ray.d.as_dvec3()];
-        let (a, b, c) = (d.dot(d), o.dot(d), o.dot(o) - f64::from(self.radius).powi(2));
-        let root = (b * b - a * c).sqrt();
-        let roots = [(-b - root) / a, (-b + root) / a].map(|t| t as f32);
-        let t = roots.into_iter().find(|t| *t > ray.t_min && *t < ray.t_max)?;
-        Some(PrimHit { t, u: 0.0, v: 0.0, shape: None, prim: 0 })
-    }
-}
-
-#[test]
-fn hc_g15_analytic_shapes_mix_with_triangles_and_stay_visible_from_afar() {
-    let mut random = Random(15);
-    let mesh = Mesh::soup(200, 0.2, &mut random);
-    let balls: Vec<_> =
-        (0..50).map(|_| Arc::new(Ball { center: random.vector(), radius: random.signed().abs() * 0.1 })).collect();
-    for options in ALL {
-        let mut items: Vec<_> =
-            balls.iter().enumerate().map(|(i, b)| (i as u32, Geometry::Analytic(Arc::clone(b) as _))).collect();
-        items.insert(20, (100, mesh.geometry()));
-        let accel = Accel::build(&items, &options).unwrap();
-        assert_eq!(accel.validate(), Ok(()));
-        for i in 0..1000 {
-            let ray = test_ray(i, &mut random);
-            let from_balls = balls.iter().enumerate().filter_map(|(i, b)| b.intersect(&ray).map(|h| (h.t, i as u32)));
-            let from_mesh = brute_force(&[&mesh], &ray).map(|h| (h.t, 100));
-            let expected = from_balls.chain(from_mesh).min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            assert_eq!(accel.intersect(&ray).map(|h| (h.t, h.shape)), expected);
-            assert_eq!(accel.occluded(&ray), expected.is_some());
-        }
-    }
-    let one = [(0, Geometry::Analytic(Arc::new(Ball { center: Vec3::ZERO, radius: 1.0 })))];
-    let accel = Accel::build(&one, &BuildOptions::default()).unwrap();
-    for distance in [1e4, 1e6] {
-        let o = Vec3::new(0.0, 0.0, distance);
-        let count = 20_000;
-        let hits = (0..count)
-            .filter(|_| accel.intersect(&Ray::new(o, random.vector() * Vec3::new(1.5, 1.5, 0.0) - o)).is_some())
-            .count();
-        let share = hits as f64 / f64::from(count);
-        let expected = std::f64::consts::PI / 9.0;
-        assert!((share - expected).abs() < 4.0 * (expected / f64::from(count)).sqrt(), "{share} at {distance}");
-    }
-}
-
-#[test]
-fn hc_g17_instances_equal_moved_copies() {
-    let mut random = Random(17);
-    let mesh = Mesh::soup(100, 0.3, &mut random);
-    let group = Arc::new(build(&[&Mesh::grid(2, 0.0), &mesh], &ALL[0]));
-    // Powers of two and whole numbers: the copies are exact, so distances must be the same bits. Some are mirrored.
-    let placements: Vec<_> = (0..40)
-        .map(|i| {
-            let scale = if i % 2 == 0 { Vec3::splat(0.5) } else { Vec3::new(-0.25, 0.5, 1.0) };
-            (scale, Vec3::new((i % 4) as f32, (i / 4 % 4) as f32, (i / 16) as f32) * 2.0)
-        })
-        .collect();
-    let items: Vec<_> = placements
-        .iter()
-        .enumerate()
-        .map(|(i, (scale, offset))| {
-            let to_world = glam::Affine3A::from_mat3_translation(glam::Mat3::from_diagonal(*scale), *offset);
-            let instance = Instance::new(Arc::clone(&group), to_world).unwrap();
-            (i as u32, Geometry::Analytic(Arc::new(instance) as _))
-        })
-        .collect();
-    let accel = Accel::build(&items, &BuildOptions::default()).unwrap();
-    assert_eq!(accel.validate(), Ok(()));
-    for _ in 0..2000 {
-        let o = (random.vector() * 1024.0).round() / 64.0;
-        let ray = Ray::new(o, (Vec3::splat(3.0) + random.vector() * 4.0 - o).normalize());
-        let expected = placements
-            .iter()
-            .enumerate()
-            .filter_map(|(i, (scale, offset))| {
-                let local = Ray::new((ray.o - *offset) / *scale, ray.d / *scale);
-                group.intersect(&local).map(|hit| Hit { instance: i as u32, ..hit })
-            })
-            .min_by(|a, b| a.t.total_cmp(&b.t).then(a.instance.cmp(&b.instance)));
-        assert_eq!(accel.intersect(&ray), expected);
-        assert_eq!(accel.occluded(&ray), expected.is_some());
-    }
-
-    let nested = Instance::new(Arc::new(accel), glam::Affine3A::IDENTITY).err();
-    assert_eq!(nested.as_deref(), Some("an instance of a group that contains instances is not supported"));
-    let flat = Instance::new(group, glam::Affine3A::from_scale(Vec3::new(1.0, 1.0, 0.0))).err();
-    assert_eq!(flat.as_deref(), Some("the transform of an instance must be invertible"));
 }
