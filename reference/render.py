@@ -10,7 +10,7 @@
 
 A reference is the mean of N independent passes (N >= 16, seeds seed .. seed+N-1), stored as float32 EXR.
 Beside it, `name.var.exr` holds the variance *of that mean*, estimated from the spread of the passes and
-rounded to 8 bits of mantissa: with 16 passes it is only known to about a third anyway.
+rounded to 5 bits of mantissa: with 16 passes it is only known to about a third anyway.
 
 An exact image is one run of `scalar_rgb` at 1 or 4 samples per pixel. A renderer that draws the same
 random numbers in the same order reproduces its noise, so it is compared at float tolerance.
@@ -63,7 +63,7 @@ def enter_environment():
 def all_scenes():
     """Every scene that has a committed reference, in a fixed order."""
     tests = ROOT / "scenes" / "tests"
-    found = [p for p in sorted(tests.glob("*/*.xml")) if p.parent.name != "parts"]
+    found = sorted(tests.glob("*/*.xml"))
     return [ROOT / "scenes" / "cornell-box.xml", *found]
 
 
@@ -286,7 +286,7 @@ def render_reference(scene, settings, given=(), integrator=None, output=None):
     output = output or (IMAGES / f"{name}.exr" if name else Path(f"{scene.stem}.exr"))
     write_exr(output, mean, channels)
     bits = variance.astype(numpy.float32).view(numpy.uint32)
-    rounded = ((bits + numpy.uint32(1 << 14)) & ~numpy.uint32((1 << 15) - 1)).view(numpy.float32)
+    rounded = ((bits + numpy.uint32(1 << 17)) & ~numpy.uint32((1 << 18) - 1)).view(numpy.float32)
     write_exr(output.with_suffix(".var.exr"), rounded, channels)
     if not numpy.isfinite(mean).all():
         print(f"warning: {scene}: not every pixel is finite")
@@ -346,8 +346,10 @@ def contact_sheet(scenes, output):
         data = numpy.atleast_3d(data)
         data = data[..., :3] if data.shape[2] >= 3 else numpy.repeat(data[..., :1], 3, axis=2)
         row, column = divmod(index, columns)
-        height, width = min(tile - 2, data.shape[0]), min(tile - 2, data.shape[1])
-        sheet[row * tile:row * tile + height, column * tile:column * tile + width] = data[:height, :width]
+        step = -(-max(data.shape[:2]) // (tile - 2))
+        data = data[::step, ::step]
+        height, width = data.shape[:2]
+        sheet[row * tile:row * tile + height, column * tile:column * tile + width] = data
         print(f"{row},{column} {reference_name(scene)}")
     mi.util.write_bitmap(str(output), sheet)
 
