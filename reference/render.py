@@ -178,8 +178,10 @@ class Job:
 
     def render(self, spp, seed):
         import numpy
-        image = self.mi.render(self.scene, integrator=self.integrator, spp=spp, seed=seed)
-        return numpy.array(image, dtype=numpy.float32)
+        self.mi.render(self.scene, integrator=self.integrator, spp=spp, seed=seed)
+        # All channels the film holds, as its file has them: `aov` returns fewer from render().
+        image = numpy.array(self.film.bitmap().convert(component_format=self.mi.Struct.Type.Float32))
+        return numpy.atleast_3d(image)
 
     def channels(self):
         return [field.name for field in self.film.bitmap().struct_()]
@@ -406,7 +408,7 @@ def main():
             if (arguments.all or arguments.exact) and settings["exact"] == "yes":
                 if not (arguments.stale and is_fresh(scene, settings, "exact")):
                     render_exact(scene, settings)
-        except RuntimeError as error:
+        except Exception as error:
             failed.append(f"{scene}: {error}")
             print(failed[-1], flush=True)
     if failed:
