@@ -180,7 +180,7 @@ class Job:
         import numpy
         self.mi.render(self.scene, integrator=self.integrator, spp=spp, seed=seed)
         # All channels the film holds, as its file has them: `aov` returns fewer from render().
-        image = numpy.array(self.film.bitmap().convert(component_format=self.mi.Struct.Type.Float32))
+        image = numpy.array(self.film.bitmap(), dtype=numpy.float32)
         return numpy.atleast_3d(image)
 
     def channels(self):
@@ -409,7 +409,7 @@ def main():
                 if not (arguments.stale and is_fresh(scene, settings, "exact")):
                     render_exact(scene, settings)
         except Exception as error:
-            failed.append(f"{scene}: {error}")
+            failed.append(f"{scene}: {str(error)[:400]}")
             print(failed[-1], flush=True)
     if failed:
         raise SystemExit("\n".join(["failed:", *failed]))
