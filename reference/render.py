@@ -8,12 +8,13 @@
     reference/render.py --check                                  recompute hashes, render nothing
     reference/render.py --sheet sheet.png [WORD ...]             one picture of all the references
 
-A reference is the mean of N independent passes (N >= 16, seeds seed .. seed+N-1), stored as float32 EXR.
-Beside it, `name.var.exr` holds the variance *of that mean*, estimated from the spread of the passes and
-rounded to 5 bits of mantissa: with 16 passes it is only known to about a third anyway.
+A reference is the mean of N independent passes (N >= 16, seeds seed .. seed+N-1), stored as float32 EXR
+rounded to 16 bits of mantissa (8e-6). Beside it, `name.var.exr` holds the variance *of that mean*, estimated
+from the spread of the passes and rounded to 5 bits: with 16 passes it is known to about a third only.
 
 An exact image is one run of `scalar_rgb` at 1 or 4 samples per pixel. A renderer that draws the same
-random numbers in the same order reproduces its noise, so it is compared at float tolerance.
+random numbers in the same order reproduces its noise, so it is compared at float tolerance. Block edges are
+those of up to three threads: 32 pixels, 16 for pictures of one block.
 
 A scene may set its own reference in a comment:  <!-- reference: spp=256 variant=scalar_rgb exact=no -->
 Keys: variant, spp, passes, seed, size (WxH), exact (yes|no), twin (a file to render instead, relative to
@@ -187,6 +188,14 @@ class Job:
         return [field.name for field in self.film.bitmap().struct_()]
 
 
+def rounded(values, bits):
+    """The values as float32 with `bits` bits of mantissa, which compress better."""
+    import numpy
+    drop = 23 - bits
+    words = numpy.ascontiguousarray(values, dtype=numpy.float32).view(numpy.uint32)
+    return ((words + numpy.uint32(1 << (drop - 1))) & ~numpy.uint32((1 << drop) - 1)).view(numpy.float32)
+
+
 def write_exr(path, array, channels):
     """Writes (H, W, C) as a float32 scanline EXR with ZIP compression; the same input gives the same bytes."""
     import numpy
@@ -286,10 +295,8 @@ def render_reference(scene, settings, given=(), integrator=None, output=None):
     channels = job.channels()
     name = reference_name(scene)
     output = output or (IMAGES / f"{name}.exr" if name else Path(f"{scene.stem}.exr"))
-    write_exr(output, mean, channels)
-    bits = variance.astype(numpy.float32).view(numpy.uint32)
-    rounded = ((bits + numpy.uint32(1 << 17)) & ~numpy.uint32((1 << 18) - 1)).view(numpy.float32)
-    write_exr(output.with_suffix(".var.exr"), rounded, channels)
+    write_exr(output, rounded(mean, 16), channels)
+    write_exr(output.with_suffix(".var.exr"), rounded(variance, 5), channels)
     if not numpy.isfinite(mean).all():
         print(f"warning: {scene}: not every pixel is finite")
     if output.resolve().is_relative_to(IMAGES):
