@@ -41,8 +41,6 @@ MANIFEST = HERE / "manifest.toml"
 IMAGES = HERE / "images"
 EXACT = HERE / "exact"
 DEFAULTS = {"variant": "llvm_ad_rgb", "spp": "128", "passes": "16", "seed": "0", "exact": "yes"}
-EXACT_RUNS = [(0, 1), (3, 4)]
-CORNELL_RUNS = [(0, 1), (0, 4), (3, 1), (3, 4)]
 
 
 def enter_environment():
@@ -66,6 +64,11 @@ def all_scenes():
     tests = ROOT / "scenes" / "tests"
     found = sorted(tests.glob("*/*.xml"))
     return [ROOT / "scenes" / "cornell-box.xml", *found]
+
+
+def exact_runs(name):
+    """The (seed, samples per pixel) of the exact images of a scene."""
+    return [(0, 1), (0, 4), (3, 1), (3, 4)] if name == "cornell-box" else [(0, 1), (3, 4)]
 
 
 def directive(scene):
@@ -152,6 +155,23 @@ def write_manifest(manifest):
 def record(kind, name, entry):
     manifest = read_manifest()
     manifest.setdefault(kind, {})[name] = entry
+    write_manifest(manifest)
+
+
+def prune():
+    """Drops images and manifest entries whose scene is gone or no longer asks for them."""
+    wanted = {"image": set(), "exact": set()}
+    for scene in all_scenes():
+        name = reference_name(scene)
+        wanted["image"].add(name)
+        if directive(scene)["exact"] == "yes":
+            wanted["exact"].update(f"{name}-seed{seed}-spp{spp}" for seed, spp in exact_runs(name))
+    manifest = read_manifest()
+    for kind, folder in (("image", IMAGES), ("exact", EXACT)):
+        manifest[kind] = {key: entry for key, entry in manifest.get(kind, {}).items() if key in wanted[kind]}
+        for file in folder.rglob("*.exr"):
+            if file.relative_to(folder).as_posix().removesuffix(".exr").removesuffix(".var") not in wanted[kind]:
+                file.unlink()
     write_manifest(manifest)
 
 
@@ -311,7 +331,7 @@ def render_exact(scene, settings):
     name = reference_name(scene)
     size = size_of(settings.get("exact_size") or settings.get("size"))
     job = Job(source, "scalar_rgb", defines, size)
-    for seed, spp in CORNELL_RUNS if name == "cornell-box" else EXACT_RUNS:
+    for seed, spp in exact_runs(name):
         image = job.render(spp, seed)
         key = f"{name}-seed{seed}-spp{spp}"
         write_exr(EXACT / f"{key}.exr", image, job.channels())
@@ -325,7 +345,7 @@ def is_fresh(scene, settings, kind):
     defines, source = defines_of(settings), rendered_file(scene, settings)
     table = read_manifest().get(kind, {})
     runs = [(None, name)] if kind == "image" else [
-        (s, f"{name}-seed{s[0]}-spp{s[1]}") for s in (CORNELL_RUNS if name == "cornell-box" else EXACT_RUNS)]
+        (s, f"{name}-seed{s[0]}-spp{s[1]}") for s in exact_runs(name)]
     for run, key in runs:
         entry = table.get(key)
         path = (IMAGES if kind == "image" else EXACT) / f"{key}.exr"
@@ -418,6 +438,8 @@ def main():
         except Exception as error:
             failed.append(f"{scene}: {str(error)[:400]}")
             print(failed[-1], flush=True)
+    if arguments.all:
+        prune()
     if failed:
         raise SystemExit("\n".join(["failed:", *failed]))
 
