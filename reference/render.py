@@ -43,18 +43,26 @@ EXACT = HERE / "exact"
 DEFAULTS = {"variant": "llvm_ad_rgb", "spp": "128", "passes": "16", "seed": "0", "exact": "yes"}
 
 
-def enter_environment():
-    """Restarts this script under an interpreter that has `mitsuba`, making one when there is none."""
+def environment():
+    """The interpreter that has `mitsuba`: LUCERNA_REFERENCE_PYTHON, or that of reference/.venv, made when missing."""
     chosen = os.environ.get("LUCERNA_REFERENCE_PYTHON")
-    if os.environ.get("LUCERNA_REFERENCE_ENTERED"):
-        return
-    python = Path(chosen) if chosen else HERE / ".venv" / "bin" / "python"
-    if not chosen and not (HERE / ".venv" / "ready").exists():
-        subprocess.check_call([sys.executable, "-m", "venv", str(HERE / ".venv")])
+    if chosen:
+        return Path(chosen)
+    folder = HERE / ".venv"
+    python = folder / "bin" / "python"
+    if not (folder / "ready").exists():
+        subprocess.check_call([sys.executable, "-m", "venv", str(folder)])
         subprocess.check_call([str(python), "-m", "pip", "install", "--quiet", "-r", str(HERE / "requirements.txt")])
-        (HERE / ".venv" / "ready").touch()
-    os.environ["LUCERNA_REFERENCE_ENTERED"] = "1"
-    os.execv(str(python), [str(python), os.path.abspath(sys.argv[0]), *sys.argv[1:]])
+        (folder / "ready").touch()
+    return python
+
+
+def enter_environment():
+    """Restarts the running script under the interpreter that has `mitsuba`."""
+    if not os.environ.get("LUCERNA_REFERENCE_ENTERED"):
+        os.environ["LUCERNA_REFERENCE_ENTERED"] = "1"
+        python = str(environment())
+        os.execv(python, [python, os.path.abspath(sys.argv[0]), *sys.argv[1:]])
 
 
 # ---- scenes and their files -----------------------------------------------------------------------
