@@ -1,7 +1,7 @@
 //! One group of shapes, placed many times.
 
-use crate::math::Aabb;
 use super::{Accel, PrimHit, Primitive, Ray};
+use crate::math::Aabb;
 use glam::{Affine3A, DAffine3, DVec3};
 use std::sync::Arc;
 

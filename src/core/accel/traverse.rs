@@ -13,11 +13,11 @@
 //! adds u S. Each plane is therefore moved outwards by 12 u S, in the constant o · (1/d), at no cost. A direction component
 //! below 10⁻¹⁸ of the largest counts as that; over the length of the scene this shifts the ray by much less than u S.
 
+use super::Primitive;
 use super::ray::Ray;
 use super::triangle::{Shear, TriangleHit};
 use super::wide::{Frame, Node, Pack, WIDTH, Word};
 use crate::math::Aabb;
-use super::Primitive;
 use std::mem::MaybeUninit;
 use std::sync::Arc;
 

@@ -1,9 +1,9 @@
 //! Does a tree keep its promises?
 
-use crate::math::Aabb;
 use super::builders::MAX_DEPTH;
 use super::traverse::Tree;
 use super::wide::{WIDTH, Word};
+use crate::math::Aabb;
 use std::collections::HashSet;
 
 /// Walks the whole tree; see [`Accel::validate`](super::Accel::validate).
