@@ -10,7 +10,9 @@
 
 pub mod accel;
 pub mod color;
+pub mod image;
 pub mod interfaces;
+pub mod io;
 pub mod math;
 pub mod render;
 pub mod sampling;
