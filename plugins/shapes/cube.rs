@@ -32,7 +32,7 @@ pub const PLUGIN: Plugin = Plugin {
 };
 
 fn build(p: &Properties<'_>) -> Built<dyn Shape> {
-    Ok(Arc::new(Mesh::new(p, cube(), false)?))
+    Ok(Arc::new(Mesh::new(p, cube())?))
 }
 
 /// Normal, direction of u and direction of v of each face, laid out as in the reference renderer.

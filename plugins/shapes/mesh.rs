@@ -2,7 +2,7 @@
 
 use lucerna_core::accel::{Accel, BuildOptions, Geometry, Hit, Ray};
 use lucerna_core::interfaces::{AreaSample, Shape, SurfaceHit};
-use lucerna_core::io::{MeshAttribute, TriangleMesh};
+use lucerna_core::io::{self, MeshAttribute, TriangleMesh};
 use lucerna_core::math::error_bounds::gamma;
 use lucerna_core::math::{Aabb, DMat4, DVec3, Frame, Vec2, Vec3, coordinate_system};
 use lucerna_core::sampling::{Discrete, warp};
@@ -58,9 +58,9 @@ impl Mesh {
     ///
     /// # Errors
     /// If `to_world` is singular or takes a vertex out of the range of single precision.
-    pub fn new(p: &Properties<'_>, mesh: TriangleMesh, face_normals: bool) -> Result<Self, Failed> {
+    pub fn new(p: &Properties<'_>, mesh: TriangleMesh) -> Result<Self, Failed> {
         let TriangleMesh { mut positions, mut normals, uvs, triangles, attributes } = mesh;
-        let face_normals = face_normals || p.bool("face_normals");
+        let face_normals = p.bool("face_normals");
         if face_normals {
             normals.clear();
         }
@@ -219,6 +219,23 @@ impl Shape for Mesh {
         }
         let Corner { indices, b, .. } = self.corner(hit.prim, hit.barycentric);
         Some((at(indices[0]) * b[0] + at(indices[1]) * b[1] + at(indices[2]) * b[2]).to_array())
+    }
+}
+
+/// Reads the file a mesh plugin names.
+///
+/// # Errors
+/// If there is no such file, or the reader refuses it.
+pub fn read_file<T>(p: &Properties<'_>, read: impl FnOnce(&[u8]) -> io::Result<T>) -> Result<T, Failed> {
+    let path = p.file("filename")?;
+    let mesh = io::read_bytes(&path).and_then(|bytes| read(&bytes));
+    mesh.map_err(|error| p.error("filename", format!("\"{}\": {error}", p.string("filename"))))
+}
+
+/// Counts v from the other end.
+pub fn flip_v(mesh: &mut TriangleMesh) {
+    for uv in &mut mesh.uvs {
+        uv.y = 1.0 - uv.y;
     }
 }
 

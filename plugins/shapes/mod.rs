@@ -5,15 +5,32 @@
 //! double precision and project them onto the surface.
 
 mod cube;
+mod cylinder;
+mod disk;
 mod mesh;
+mod obj;
 mod plane;
+mod ply;
 mod rectangle;
+mod serialized;
+mod sphere;
 
+use lucerna_core::accel::{Aabb, Hit, PrimHit, Ray};
+use lucerna_core::math::Vec3;
 use lucerna_core::scene::description::ObjectKind;
 use lucerna_core::scene::{Param, Plugin};
 
 /// The table of all shapes.
-pub const PLUGINS: &[Plugin] = &[cube::PLUGIN, rectangle::PLUGIN];
+pub const PLUGINS: &[Plugin] = &[
+    cube::PLUGIN,
+    cylinder::PLUGIN,
+    disk::PLUGIN,
+    obj::PLUGIN,
+    ply::PLUGIN,
+    rectangle::PLUGIN,
+    serialized::PLUGIN,
+    sphere::PLUGIN,
+];
 
 /// What every shape accepts. Material, light and media are hung on the shape by the scene, not by the constructor.
 const COMMON: &[Param] = &[
@@ -30,3 +47,29 @@ const ORIENTED: &[Param] = &[Param::bool("flip_normals", false, "turn the surfac
 
 /// What meshes accept.
 const MESH: &[Param] = &[Param::bool("face_normals", false, "shade flat, without normals per vertex")];
+
+/// The first of two ordered roots that lies on the ray and is part of the surface. [`Hit::u`] says which one it was,
+/// because rounded distances may not: see [`taken_root`].
+///
+/// [`Hit::u`]: lucerna_core::accel::Hit::u
+#[inline]
+fn nearest_root(ray: &Ray, roots: [f64; 2], on_surface: impl Fn(f64) -> bool) -> Option<PrimHit> {
+    let hit = |index: usize| {
+        let t = roots[index] as f32;
+        let found = ray.t_min < t && t < ray.t_max && on_surface(roots[index]);
+        found.then_some(PrimHit { t, u: index as f32, v: 0.0, shape: None, prim: 0 })
+    };
+    hit(0).or_else(|| hit(1))
+}
+
+/// The distance of a hit that [`nearest_root`] gave, in double precision.
+#[inline]
+fn taken_root(hit: &Hit, roots: Option<[f64; 2]>) -> f64 {
+    roots.map_or(f64::from(hit.t), |roots| roots[usize::from(hit.u > 0.0)])
+}
+
+/// A box around points that are known to an error on each axis.
+fn enclose<const N: usize>(points: [Vec3; N], error: Vec3) -> Aabb {
+    let Aabb { min, max } = Aabb::of(&points);
+    Aabb { min: (min - error).map(f32::next_down), max: (max + error).map(f32::next_up) }
+}
