@@ -2,6 +2,7 @@
 
 mod distribution;
 mod pcg32;
+pub mod sobol;
 mod stream;
 pub mod warp;
 
