@@ -5,8 +5,10 @@
 //!           ─ check ─► every parameter known and in range ─ instantiate ► Scene
 //! ```
 
+pub mod check;
 pub mod description;
 pub mod error;
+mod instantiate;
 pub mod object;
 pub mod param;
 pub mod properties;
@@ -15,6 +17,7 @@ mod world;
 
 pub use description::{Description, Node, NodeId, ObjectKind, Parameter, SpectrumValue, Value};
 pub use error::{Location, SceneError, SceneErrors, did_you_mean};
+pub use instantiate::{Instantiated, build_one, instantiate};
 pub use object::{BuiltSensor, BuiltShape, Object};
 pub use param::{Param, Slot};
 pub use properties::Properties;
