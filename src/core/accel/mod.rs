@@ -1,72 +1,290 @@
-//! Ray acceleration (types only).
-use crate::math::{Aabb, Vec3};
-use std::sync::Arc;
+//! What does a ray hit first, and does it hit anything?
+//!
+//! [`Accel::build`] arranges meshes, analytic shapes and instances in a tree with eight children a node;
+//! [`Accel::intersect`] and [`Accel::occluded`] walk it. A binary tree comes from one of the [`builders`], `collapse`
+//! turns it into the `wide` one, `traverse` is the walk, and `triangle` decides what is hit.
+//!
+//! # What is promised
+//!
+//! * A closed mesh has no holes, at any place and at sizes from 10⁻⁸ to 10⁸ (coordinates up to 10¹⁸ are exact enough for
+//!   the tests; beyond, hits may be lost, but nothing panics).
+//! * The hit is the one with the least `t`, and among those of equal `t` the least (shape, prim). It does not depend on
+//!   the builder, the number of threads or the processor.
+//! * Triangles without area or with non-finite vertices are left out and counted in [`Stats::degenerate`].
 
-/// A ray.
-#[derive(Clone, Copy, Debug)]
-pub struct Ray {
-    /// Origin.
-    pub o: Vec3,
-    /// Direction.
-    pub d: Vec3,
-    /// Hits at or before this parameter do not count.
-    pub t_min: f32,
-    /// Hits beyond this parameter do not count.
-    pub t_max: f32,
-}
-/// Hit.
-#[derive(Clone, Copy, Debug)]
-#[allow(missing_docs)]
-pub struct Hit {
-    pub t: f32,
-    pub u: f32,
-    pub v: f32,
-    pub shape: u32,
-    pub prim: u32,
-    pub instance: u32,
-}
-/// None.
-pub const NO_INSTANCE: u32 = u32::MAX;
-/// What an analytic shape answers.
-#[derive(Clone, Copy, Debug)]
-#[allow(missing_docs)]
-pub struct PrimHit {
-    pub t: f32,
-    pub u: f32,
-    pub v: f32,
-    pub shape: u32,
-    pub prim: u32,
-}
-/// Analytic.
-pub trait Primitive: Send + Sync {
-    /// Bounds.
-    fn bounds(&self) -> Aabb;
-    /// Nearest.
-    fn intersect(&self, ray: &Ray) -> Option<PrimHit>;
-}
-/// Geometry.
-#[allow(missing_docs)]
+pub mod builders;
+mod collapse;
+mod instance;
+mod primitive;
+mod ray;
+#[allow(unsafe_code)]
+mod traverse;
+mod triangle;
+mod validate;
+mod wide;
+
+pub use instance::Instance;
+pub use primitive::{PrimHit, Primitive};
+pub use ray::{Hit, NO_INSTANCE, Ray};
+
+use crate::math::Aabb;
+use builders::Builder;
+use glam::Vec3;
+use rayon::prelude::*;
+use std::sync::Arc;
+use traverse::{Found, Path, Tree};
+use wide::{Frame, Pack, Word};
+
+/// The surface of one shape.
+#[derive(Clone)]
 pub enum Geometry<'a> {
-    Mesh { positions: &'a [Vec3], triangles: &'a [[u32; 3]] },
+    /// Triangles by index into positions; copied into the tree.
+    Mesh {
+        /// Vertices, in world units.
+        positions: &'a [Vec3],
+        /// Corners of each triangle.
+        triangles: &'a [[u32; 3]],
+    },
+    /// A shape that finds its own hits, or an instance.
     Analytic(Arc<dyn Primitive>),
 }
-/// Accel.
-pub struct Accel;
-/// Options.
-#[derive(Default)]
-pub struct BuildOptions;
-#[allow(missing_docs)]
+
+/// Which binary tree to start from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BuilderKind {
+    /// [`builders::BinnedSah`].
+    #[default]
+    BinnedSah,
+    /// [`builders::Ploc`].
+    Ploc,
+}
+
+/// How to build.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct BuildOptions {
+    /// The builder of the binary tree.
+    pub builder: BuilderKind,
+    /// Do without vector instructions beyond the processor family's baseline. Hits are the same.
+    pub portable: bool,
+}
+
+/// What was built.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Stats {
+    /// Triangles and analytic shapes in the tree.
+    pub primitives: usize,
+    /// Inner nodes.
+    pub nodes: usize,
+    /// Leaves of up to eight triangles.
+    pub packs: usize,
+    /// Memory of the tree, without what analytic shapes own.
+    pub bytes: usize,
+    /// Primitives left out: no area, not finite, or empty bounds.
+    pub degenerate: usize,
+}
+
+/// A scene or a group of shapes, ready for rays.
+pub struct Accel {
+    tree: Tree,
+    path: Path,
+    /// For each item, its shape and the number of its first primitive; ascending in both.
+    items: Vec<(u32, u32)>,
+    degenerate: usize,
+    has_instances: bool,
+}
+
 impl Accel {
-    pub fn build(_: &[(u32, Geometry<'_>)], _: &BuildOptions) -> Result<Accel, String> {
-        Ok(Accel)
+    /// Builds the tree over `items`, pairs of a shape index and its geometry.
+    ///
+    /// # Errors
+    /// If a triangle refers to a vertex that is not there, if an analytic shape has bounds that are not finite, or if
+    /// there are more than 2³⁰ primitives.
+    pub fn build(items: &[(u32, Geometry)], options: &BuildOptions) -> Result<Self, String> {
+        let mut sorted: Vec<_> = items.iter().collect();
+        sorted.sort_by_key(|(shape, _)| *shape);
+
+        let mut found = Vec::with_capacity(items.len());
+        let mut first = 0_usize;
+        let (mut triangles, mut analytic) = (Vec::new(), Vec::new());
+        for (shape, geometry) in &sorted {
+            let number = u32::try_from(first).map_err(|_| TOO_MANY)?;
+            found.push((*shape, number));
+            match geometry {
+                Geometry::Mesh { positions, triangles: corners } => {
+                    first += corners.len();
+                    if first > Word::LIMIT {
+                        return Err(TOO_MANY.into());
+                    }
+                    collect_triangles(*shape, positions, corners, number, &mut triangles)?;
+                }
+                Geometry::Analytic(primitive) => {
+                    first += 1;
+                    let bounds = primitive.bounds();
+                    if bounds.is_empty() && !bounds.min.is_nan() && !bounds.max.is_nan() {
+                        continue;
+                    }
+                    if !bounds.is_finite() {
+                        return Err(format!("shape {shape}: its bounds are not finite"));
+                    }
+                    analytic.push((number, bounds, Arc::clone(primitive)));
+                }
+            }
+        }
+        if first > Word::LIMIT {
+            return Err(TOO_MANY.into());
+        }
+
+        let degenerate = first - triangles.len() - analytic.len();
+        let has_instances = analytic.iter().any(|(_, _, p)| p.is_instance());
+        let (mut bounds, numbers): (Vec<_>, Vec<_>) = triangles.into_iter().unzip();
+        let triangle_count = numbers.len() as u32;
+        bounds.extend(analytic.iter().map(|(_, bounds, _)| *bounds));
+        let binary = match options.builder {
+            BuilderKind::BinnedSah => builders::BinnedSah.build(&bounds),
+            BuilderKind::Ploc => builders::Ploc.build(&bounds),
+        };
+        drop(bounds);
+
+        let total = binary.nodes.first().map_or(Aabb::EMPTY, |root| root.bounds);
+        let frame = Frame::new(&total);
+        let mut tree = Tree {
+            nodes: Vec::new(),
+            packs: Vec::new(),
+            primitives: analytic.into_iter().map(|(number, _, p)| (number, p)).collect(),
+            root: None,
+            frame,
+            bounds: total,
+        };
+        if !binary.nodes.is_empty() {
+            let wide = collapse::collapse(&binary, &frame, &|prim| prim.checked_sub(triangle_count));
+            drop(binary);
+            tree.nodes = wide.nodes;
+            tree.root = Some(wide.root);
+            let fill = |members: &[u32; wide::WIDTH]| {
+                let mut pack = Pack::EMPTY;
+                for (lane, &prim) in members.iter().enumerate().filter(|(_, prim)| **prim != u32::MAX) {
+                    let number = numbers[prim as usize];
+                    let item = found.partition_point(|(_, first)| *first <= number) - 1;
+                    if let Geometry::Mesh { positions, triangles } = &sorted[item].1 {
+                        let corners = triangles[(number - found[item].1) as usize];
+                        pack.set(lane, corners.map(|i| positions[i as usize]), number);
+                    }
+                }
+                pack
+            };
+            tree.packs = wide.packs.par_iter().map(fill).collect();
+        }
+        let path = if options.portable { Path::PORTABLE } else { Path::fastest() };
+        Ok(Self { tree, path, items: found, degenerate, has_instances })
     }
-    pub fn intersect(&self, _: &Ray) -> Option<Hit> {
-        None
+
+    /// The nearest hit with `t_min < t < t_max`.
+    #[must_use]
+    pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        if !ray.is_traceable() {
+            return None;
+        }
+        let Some((scaled, scale)) = rescaled(ray) else {
+            return traverse::closest(&self.tree, self.path, ray).map(|found| self.hit(found));
+        };
+        let mut hit = traverse::closest(&self.tree, self.path, &scaled).map(|found| self.hit(found))?;
+        hit.t = (f64::from(hit.t) / scale) as f32;
+        (ray.t_min < hit.t && hit.t < ray.t_max).then_some(hit)
     }
-    pub fn occluded(&self, _: &Ray) -> bool {
-        false
+
+    /// Whether anything is hit with `t_min < t < t_max`. Quicker than [`Accel::intersect`].
+    #[must_use]
+    pub fn occluded(&self, ray: &Ray) -> bool {
+        ray.is_traceable()
+            && match rescaled(ray) {
+                None => traverse::any(&self.tree, self.path, ray),
+                Some((scaled, _)) => traverse::any(&self.tree, self.path, &scaled),
+            }
     }
+
+    /// A box around everything, empty when there is nothing.
+    #[must_use]
     pub fn bounds(&self) -> Aabb {
-        Aabb::EMPTY
+        self.tree.bounds
+    }
+
+    /// Whether any item is an instance.
+    #[must_use]
+    pub fn has_instances(&self) -> bool {
+        self.has_instances
+    }
+
+    /// Sizes.
+    #[must_use]
+    pub fn stats(&self) -> Stats {
+        let tree = &self.tree;
+        let triangles = tree.packs.iter().flat_map(|pack| pack.ids).filter(|id| *id != u32::MAX).count();
+        Stats {
+            primitives: triangles + tree.primitives.len(),
+            nodes: tree.nodes.len(),
+            packs: tree.packs.len(),
+            bytes: size_of_val(tree.nodes.as_slice())
+                + size_of_val(tree.packs.as_slice())
+                + size_of_val(tree.primitives.as_slice())
+                + size_of_val(self.items.as_slice()),
+            degenerate: self.degenerate,
+        }
+    }
+
+    /// Checks that boxes hold what is below them, that every primitive is in one leaf, and that the tree is not too deep.
+    ///
+    /// # Errors
+    /// Says which node or primitive is wrong.
+    pub fn validate(&self) -> Result<(), String> {
+        validate::validate(&self.tree)
+    }
+
+    fn hit(&self, found: Found) -> Hit {
+        let item = self.items.partition_point(|(_, first)| *first <= found.id) - 1;
+        let (shape, first) = self.items[item];
+        let Found { t, u, v, id, part } = found;
+        match part {
+            None => Hit { t, u, v, shape, prim: id - first, instance: NO_INSTANCE },
+            Some((None, prim)) => Hit { t, u, v, shape, prim, instance: NO_INSTANCE },
+            Some((Some(inner), prim)) => Hit { t, u, v, shape: inner, prim, instance: shape },
+        }
     }
 }
+
+const TOO_MANY: &str = "more than 2^30 primitives in one scene or group";
+
+/// Appends the bounds and numbers of all triangles that can be hit.
+fn collect_triangles(
+    shape: u32,
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+    first: u32,
+    into: &mut Vec<(Aabb, u32)>,
+) -> Result<(), String> {
+    if let Some(bad) = triangles.par_iter().position_first(|t| t.iter().any(|&i| i as usize >= positions.len())) {
+        let count = positions.len();
+        return Err(format!("shape {shape}: triangle {bad} refers to vertices {:?} of {count}", triangles[bad]));
+    }
+    into.par_extend(triangles.par_iter().enumerate().filter_map(|(i, corners)| {
+        let points = corners.map(|i| positions[i as usize]);
+        triangle::is_hittable(points).then(|| (Aabb::of_points(points), first + i as u32))
+    }));
+    Ok(())
+}
+
+/// For a direction much shorter or longer than 1: the same ray with a direction of about 1, and the power of two that
+/// distances were multiplied with. So reciprocals of the direction stay far from the limits of `f32`.
+#[inline]
+fn rescaled(ray: &Ray) -> Option<(Ray, f64)> {
+    let longest = ray.d.abs().max_element();
+    if (1e-3..=1e3).contains(&longest) {
+        return None;
+    }
+    let scale = f64::from(longest).log2().floor().exp2();
+    let d = (ray.d.as_dvec3() / scale).as_vec3();
+    let [t_min, t_max] = [ray.t_min, ray.t_max].map(|t| (f64::from(t) * scale) as f32);
+    Some((Ray { o: ray.o, d, t_min, t_max }, scale))
+}
+
+#[cfg(test)]
+mod tests;

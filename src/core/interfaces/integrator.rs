@@ -30,6 +30,8 @@ pub struct Radiance {
     pub rgb: Rgb,
     /// Alpha: 1 where the path met something that is not transparent, else 0.
     pub alpha: f32,
+    /// Rays traced to find it.
+    pub rays: u32,
 }
 
 /// A forward estimator without state between samples; the pass loop is shared

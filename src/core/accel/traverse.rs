@@ -1,0 +1,435 @@
+//! The way of one ray through the tree. The only `unsafe` code of the renderer: vector instructions chosen at run time,
+//! and a stack that is not cleared for every ray.
+//!
+//! Two kernels answer two questions, which boxes of a node a ray enters and which triangles of a pack it may hit. Both
+//! err on the side of yes by different amounts, so they may visit different nodes; which triangle is hit, and where, is
+//! decided in [`Shear::intersect`] for both. So their hits are the same, bit for bit.
+//!
+//! # Why no box is missed
+//!
+//! With u = 2⁻²⁴, planes p and origin o relative to the middle of the scene, and S = max |p| + |o|: moving o there is wrong
+//! by u S; the plane's distance (p − o) / d, computed as p · (1/d) − o · (1/d), is off by what moving p by 3 u S would do; and
+//! the triangle test accepts points up to 6 u S beside a triangle, since it rounds the sheared vertices. The rounding of t
+//! adds u S. Each plane is therefore moved outwards by 12 u S, in the constant o · (1/d), at no cost. A direction component
+//! below 10⁻¹⁸ of the largest counts as that; over the length of the scene this shifts the ray by much less than u S.
+
+use super::Primitive;
+use super::ray::Ray;
+use super::triangle::{Shear, TriangleHit};
+use super::wide::{Frame, Node, Pack, WIDTH, Word};
+use crate::math::Aabb;
+use std::mem::MaybeUninit;
+use std::sync::Arc;
+
+/// Everything a ray needs.
+pub struct Tree {
+    /// Inner nodes; parents come before their children.
+    pub nodes: Vec<Node>,
+    /// Leaves of triangles.
+    pub packs: Vec<Pack>,
+    /// All other leaves, each with its number in the order of (shape, prim).
+    pub primitives: Vec<(u32, Arc<dyn Primitive>)>,
+    /// Where to begin; `None` when there is nothing.
+    pub root: Option<Word>,
+    /// The frame of the nodes' boxes.
+    pub frame: Frame,
+    /// All geometry, in world units.
+    pub bounds: Aabb,
+}
+
+/// What the closest hit was found on, by number.
+#[derive(Clone, Copy, Debug)]
+pub struct Found {
+    pub t: f32,
+    pub u: f32,
+    pub v: f32,
+    pub id: u32,
+    /// For analytic primitives: shape within an instance, and part.
+    pub part: Option<(Option<u32>, u32)>,
+}
+
+/// Which vector instructions to use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Path(Instructions);
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Instructions {
+    /// Only ever made by [`Path::fastest`], after it has asked the processor.
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+    Portable,
+}
+
+impl Path {
+    /// Runs on every processor.
+    pub const PORTABLE: Self = Self(Instructions::Portable);
+
+    /// The best this processor offers.
+    #[must_use]
+    pub fn fastest() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if ["avx2", "fma", "bmi1", "bmi2", "lzcnt", "popcnt"].iter().all(|f| avx2::has(f)) {
+            return Self(Instructions::Avx2);
+        }
+        Self::PORTABLE
+    }
+}
+
+/// The closest hit of a ray that [`Ray::is_traceable`], with a direction neither tiny nor huge.
+pub fn closest(tree: &Tree, path: Path, ray: &Ray) -> Option<Found> {
+    match path.0 {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: `Path::fastest` is the only place that makes `Avx2`, after it has found the instructions.
+        Instructions::Avx2 => unsafe { avx2::closest(tree, ray) },
+        Instructions::Portable => walk::<Portable, false>(tree, ray),
+    }
+}
+
+/// Whether such a ray hits anything.
+pub fn any(tree: &Tree, path: Path, ray: &Ray) -> bool {
+    match path.0 {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as in `closest`.
+        Instructions::Avx2 => unsafe { avx2::any(tree, ray) }.is_some(),
+        Instructions::Portable => walk::<Portable, true>(tree, ray).is_some(),
+    }
+}
+
+/// The constants of one ray.
+struct Beam {
+    shear: Shear,
+    inv_d: [f32; 3],
+    /// Subtracted from the near planes' p · (1/d).
+    near_offset: [f32; 3],
+    /// Subtracted from the far planes' p · (1/d).
+    far_offset: [f32; 3],
+    /// Rows of [`Node::rows`] with the near planes.
+    near_rows: [usize; 3],
+    /// Rows of [`Node::rows`] with the far planes.
+    far_rows: [usize; 3],
+    t_min: f32,
+}
+
+impl Beam {
+    #[inline(always)]
+    fn new(frame: &Frame, ray: &Ray) -> Self {
+        let tiny = ray.d.abs().max_element() * 1e-18;
+        let o = ray.o - frame.center;
+        let margin = 12.0 * 0.5 * f32::EPSILON * (frame.reach + o.abs().max_element());
+        let mut beam = Self {
+            shear: Shear::new(ray.o, ray.d),
+            inv_d: [0.0; 3],
+            near_offset: [0.0; 3],
+            far_offset: [0.0; 3],
+            near_rows: [0; 3],
+            far_rows: [0; 3],
+            t_min: ray.t_min.max(0.0),
+        };
+        for axis in 0..3 {
+            let d = if ray.d[axis].abs() < tiny { tiny.copysign(ray.d[axis]) } else { ray.d[axis] };
+            let inv = 1.0 / d;
+            beam.inv_d[axis] = inv;
+            beam.near_offset[axis] = o[axis] * inv + margin * inv.abs();
+            beam.far_offset[axis] = o[axis] * inv - margin * inv.abs();
+            beam.near_rows[axis] = if inv < 0.0 { axis + 3 } else { axis };
+            beam.far_rows[axis] = if inv < 0.0 { axis } else { axis + 3 };
+        }
+        beam
+    }
+}
+
+/// The two questions that take vector instructions.
+trait Kernel {
+    /// One bit for each box that holds points of the ray between `t_min` and `t_max`; `near` gets the entry distances.
+    ///
+    /// # Safety
+    /// The processor has the instructions of the kernel.
+    unsafe fn boxes(beam: &Beam, node: &Node, t_max: f32, near: &mut [f32; WIDTH]) -> u32;
+
+    /// One bit for each triangle that the ray's line may hit.
+    ///
+    /// # Safety
+    /// The processor has the instructions of the kernel.
+    unsafe fn candidates(beam: &Beam, pack: &Pack) -> u32;
+
+    /// Asks for two cache lines.
+    fn prefetch<T>(_: &[T], _index: usize) {}
+}
+
+struct Portable;
+
+impl Kernel for Portable {
+    #[inline(always)]
+    unsafe fn boxes(beam: &Beam, node: &Node, t_max: f32, near: &mut [f32; WIDTH]) -> u32 {
+        let mut far = [t_max; WIDTH];
+        *near = [beam.t_min; WIDTH];
+        for axis in 0..3 {
+            let [near_row, far_row] = [&node.rows[beam.near_rows[axis]], &node.rows[beam.far_rows[axis]]];
+            let [inv, near_offset, far_offset] = [beam.inv_d[axis], beam.near_offset[axis], beam.far_offset[axis]];
+            for i in 0..WIDTH {
+                let [enter, leave] = [near_row[i] * inv - near_offset, far_row[i] * inv - far_offset];
+                near[i] = if enter > near[i] { enter } else { near[i] };
+                far[i] = if leave < far[i] { leave } else { far[i] };
+            }
+        }
+        (0..WIDTH).fold(0, |mask, i| mask | u32::from(near[i] <= far[i]) << i)
+    }
+
+    #[inline(always)]
+    unsafe fn candidates(beam: &Beam, pack: &Pack) -> u32 {
+        let Shear { o, axes, s, .. } = beam.shear;
+        let sheared = pack.vertices.each_ref().map(|rows| {
+            let (mut x, mut y) = ([0.0; WIDTH], [0.0; WIDTH]);
+            for i in 0..WIDTH {
+                let height = rows[axes[2]][i] - o[2];
+                x[i] = rows[axes[0]][i] - o[0] - s[0] * height;
+                y[i] = rows[axes[1]][i] - o[1] - s[1] * height;
+            }
+            (x, y)
+        });
+        let [a, b, c] = &sheared;
+        let mut mask = 0;
+        for i in 0..WIDTH {
+            let edges = [
+                c.0[i] * b.1[i] - c.1[i] * b.0[i],
+                a.0[i] * c.1[i] - a.1[i] * c.0[i],
+                b.0[i] * a.1[i] - b.1[i] * a.0[i],
+            ];
+            let negative = (edges[0] < 0.0) | (edges[1] < 0.0) | (edges[2] < 0.0);
+            let positive = (edges[0] > 0.0) | (edges[1] > 0.0) | (edges[2] > 0.0);
+            mask |= u32::from(!(negative & positive) & (edges[0] == edges[0])) << i;
+        }
+        mask
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+mod avx2 {
+    use super::{Beam, Found, Kernel, Node, Pack, Ray, Shear, Tree, WIDTH, walk};
+    use std::arch::x86_64::*;
+
+    pub fn has(feature: &str) -> bool {
+        match feature {
+            "avx2" => is_x86_feature_detected!("avx2"),
+            "fma" => is_x86_feature_detected!("fma"),
+            "bmi1" => is_x86_feature_detected!("bmi1"),
+            "bmi2" => is_x86_feature_detected!("bmi2"),
+            "lzcnt" => is_x86_feature_detected!("lzcnt"),
+            "popcnt" => is_x86_feature_detected!("popcnt"),
+            _ => false,
+        }
+    }
+
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+    pub fn closest(tree: &Tree, ray: &Ray) -> Option<Found> {
+        walk::<Avx2, false>(tree, ray)
+    }
+
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+    pub fn any(tree: &Tree, ray: &Ray) -> Option<Found> {
+        walk::<Avx2, true>(tree, ray)
+    }
+
+    /// Inlined into the two functions above and used nowhere else.
+    struct Avx2;
+
+    impl Kernel for Avx2 {
+        #[inline(always)]
+        unsafe fn boxes(beam: &Beam, node: &Node, t_max: f32, near: &mut [f32; WIDTH]) -> u32 {
+            // SAFETY: the caller has AVX2 and FMA; all loads and the store are of whole arrays of eight floats, and the
+            // rows of a node are aligned to 32 bytes.
+            unsafe {
+                let enter = |axis: usize| {
+                    let planes = _mm256_load_ps(node.rows[beam.near_rows[axis]].as_ptr());
+                    let [inv, offset] = [beam.inv_d[axis], beam.near_offset[axis]].map(|x| _mm256_set1_ps(x));
+                    _mm256_fmsub_ps(planes, inv, offset)
+                };
+                let leave = |axis: usize| {
+                    let planes = _mm256_load_ps(node.rows[beam.far_rows[axis]].as_ptr());
+                    let [inv, offset] = [beam.inv_d[axis], beam.far_offset[axis]].map(|x| _mm256_set1_ps(x));
+                    _mm256_fmsub_ps(planes, inv, offset)
+                };
+                // A NaN in the first operand yields the second: the box counts as entered.
+                let near_xy = _mm256_max_ps(enter(0), _mm256_max_ps(enter(1), _mm256_set1_ps(beam.t_min)));
+                let far_xy = _mm256_min_ps(leave(0), _mm256_min_ps(leave(1), _mm256_set1_ps(t_max)));
+                let entry = _mm256_max_ps(enter(2), near_xy);
+                let exit = _mm256_min_ps(leave(2), far_xy);
+                _mm256_storeu_ps(near.as_mut_ptr(), entry);
+                _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(entry, exit)) as u32
+            }
+        }
+
+        #[inline(always)]
+        unsafe fn candidates(beam: &Beam, pack: &Pack) -> u32 {
+            let Shear { o, axes, s, .. } = &beam.shear;
+            // SAFETY: the caller has AVX2; all loads are of whole rows, which are aligned to 32 bytes in a pack.
+            unsafe {
+                let [ox, oy, oz, sx, sy] = [o[0], o[1], o[2], s[0], s[1]].map(|x| _mm256_set1_ps(x));
+                let shear = |vertex: usize| {
+                    let [x, y, z] = axes.map(|axis| _mm256_load_ps(pack.vertices[vertex][axis].as_ptr()));
+                    let height = _mm256_sub_ps(z, oz);
+                    (
+                        _mm256_sub_ps(_mm256_sub_ps(x, ox), _mm256_mul_ps(sx, height)),
+                        _mm256_sub_ps(_mm256_sub_ps(y, oy), _mm256_mul_ps(sy, height)),
+                    )
+                };
+                let [(ax, ay), (bx, by), (cx, cy)] = [shear(0), shear(1), shear(2)];
+                let cross = |px, py, qx, qy| _mm256_sub_ps(_mm256_mul_ps(px, qy), _mm256_mul_ps(py, qx));
+                let [u, v, w] = [cross(cx, cy, bx, by), cross(ax, ay, cx, cy), cross(bx, by, ax, ay)];
+                let zero = _mm256_setzero_ps();
+                let either = |e, f, g| _mm256_or_ps(_mm256_or_ps(e, f), g);
+                let [un, vn, wn] = [u, v, w].map(|e| _mm256_cmp_ps::<_CMP_LT_OQ>(e, zero));
+                let [up, vp, wp] = [u, v, w].map(|e| _mm256_cmp_ps::<_CMP_GT_OQ>(e, zero));
+                let both = _mm256_and_ps(either(un, vn, wn), either(up, vp, wp));
+                let occupied = _mm256_cmp_ps::<_CMP_ORD_Q>(u, u);
+                _mm256_movemask_ps(_mm256_andnot_ps(both, occupied)) as u32
+            }
+        }
+
+        #[inline(always)]
+        fn prefetch<T>(items: &[T], index: usize) {
+            let line = items.as_ptr().wrapping_add(index).cast::<i8>();
+            // SAFETY: prefetching reads nothing and cannot fault, whatever the address.
+            unsafe {
+                _mm_prefetch::<_MM_HINT_T0>(line);
+                _mm_prefetch::<_MM_HINT_T0>(line.wrapping_add(64));
+            }
+        }
+    }
+}
+
+/// Nodes that wait: entry distance in the upper half, word in the lower, so that comparing integers compares distances.
+///
+/// Each of at most [`MAX_DEPTH`](super::builders::MAX_DEPTH) levels leaves at most seven behind; the deepest adds eight.
+struct Stack {
+    entries: [MaybeUninit<u64>; Self::SIZE],
+    len: usize,
+}
+
+impl Stack {
+    const SIZE: usize = (WIDTH - 1) * super::builders::MAX_DEPTH + WIDTH;
+
+    #[inline(always)]
+    fn new() -> Self {
+        Self { entries: [const { MaybeUninit::uninit() }; Self::SIZE], len: 0 }
+    }
+
+    #[inline(always)]
+    fn push(&mut self, entry: u64) {
+        self.entries[self.len].write(entry);
+        self.len += 1;
+    }
+
+    #[inline(always)]
+    fn pop(&mut self) -> Option<u64> {
+        self.len = self.len.checked_sub(1)?;
+        Some(self.get(self.len))
+    }
+
+    /// Puts an entry among those from `base` on, of which the last is the nearest.
+    #[inline(always)]
+    fn insert(&mut self, base: usize, entry: u64) {
+        let mut at = self.len;
+        self.push(entry);
+        while at > base && self.get(at - 1) < entry {
+            let farther = self.get(at - 1);
+            self.entries[at].write(farther);
+            at -= 1;
+        }
+        self.entries[at].write(entry);
+    }
+
+    #[inline(always)]
+    fn get(&self, at: usize) -> u64 {
+        // SAFETY: `push` has written every entry below the largest `len` so far, and no entry is read beyond that.
+        unsafe { self.entries[at].assume_init() }
+    }
+}
+
+/// The closest hit, or any hit. Inlined into one function for each kernel, since its instructions must match.
+#[inline(always)]
+fn walk<K: Kernel, const ANY: bool>(tree: &Tree, ray: &Ray) -> Option<Found> {
+    let beam = Beam::new(&tree.frame, ray);
+    let mut best = Best { t: ray.t_max, found: None };
+    let mut stack = Stack::new();
+    let mut near = [0.0; WIDTH];
+    let mut word = tree.root?;
+    loop {
+        if word.is_node() {
+            let node = &tree.nodes[word.index()];
+            // SAFETY: `walk` runs with a kernel only inside of a function compiled for its instructions.
+            let mut mask = unsafe { K::boxes(&beam, node, best.t, &mut near) };
+            if mask.is_power_of_two() {
+                word = node.children[mask.trailing_zeros() as usize];
+                continue;
+            }
+            let base = stack.len;
+            while mask != 0 {
+                let slot = mask.trailing_zeros() as usize & (WIDTH - 1);
+                mask &= mask - 1;
+                let child = node.children[slot];
+                if child.is_node() {
+                    K::prefetch(&tree.nodes, child.index());
+                } else {
+                    K::prefetch(&tree.packs, child.index());
+                }
+                let entry = u64::from(near[slot].to_bits()) << 32 | u64::from(child.0);
+                if ANY { stack.push(entry) } else { stack.insert(base, entry) }
+            }
+        } else if word.is_primitive() {
+            let (id, primitive) = &tree.primitives[word.index()];
+            if ANY {
+                let ray = Ray { t_min: beam.t_min, ..*ray };
+                if primitive.occluded(&ray) {
+                    return Some(Found { t: 0.0, u: 0.0, v: 0.0, id: *id, part: None });
+                }
+            } else {
+                // The next number lets an equal distance through, so that its shape index can decide.
+                let ray = Ray { t_min: beam.t_min, t_max: best.t.next_up(), ..*ray };
+                if let Some(hit) = primitive.intersect(&ray) {
+                    let part = Some((hit.shape, hit.prim));
+                    best.offer(beam.t_min, Found { t: hit.t, u: hit.u, v: hit.v, id: *id, part });
+                }
+            }
+        } else {
+            let pack = &tree.packs[word.index()];
+            // SAFETY: as above.
+            let mut mask = unsafe { K::candidates(&beam, pack) };
+            while mask != 0 {
+                let lane = mask.trailing_zeros() as usize & (WIDTH - 1);
+                mask &= mask - 1;
+                let triangle = pack.vertices.each_ref().map(|rows| rows.each_ref().map(|row| row[lane]));
+                if let Some(TriangleHit { t, u, v }) = beam.shear.intersect(triangle) {
+                    best.offer(beam.t_min, Found { t, u, v, id: pack.ids[lane], part: None });
+                    if ANY && best.found.is_some() {
+                        return best.found;
+                    }
+                }
+            }
+        }
+        loop {
+            let Some(entry) = stack.pop() else { return best.found };
+            if ANY || f32::from_bits((entry >> 32) as u32) <= best.t {
+                word = Word(entry as u32);
+                break;
+            }
+        }
+    }
+}
+
+struct Best {
+    t: f32,
+    found: Option<Found>,
+}
+
+impl Best {
+    /// Takes what is nearer, or as near with a smaller number.
+    #[inline(always)]
+    fn offer(&mut self, t_min: f32, hit: Found) {
+        let first = hit.t == self.t && self.found.is_some_and(|best| hit.id < best.id);
+        if hit.t > t_min && (hit.t < self.t || first) {
+            self.t = hit.t;
+            self.found = Some(hit);
+        }
+    }
+}
