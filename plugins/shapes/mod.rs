@@ -15,8 +15,8 @@ mod rectangle;
 mod serialized;
 mod sphere;
 
-use lucerna_core::accel::{Aabb, Hit, PrimHit, Ray};
-use lucerna_core::math::Vec3;
+use lucerna_core::accel::{Hit, PrimHit, Ray};
+use lucerna_core::math::{Aabb, Vec3};
 use lucerna_core::scene::description::ObjectKind;
 use lucerna_core::scene::{Param, Plugin};
 
@@ -70,6 +70,6 @@ fn taken_root(hit: &Hit, roots: Option<[f64; 2]>) -> f64 {
 
 /// A box around points that are known to an error on each axis.
 fn enclose<const N: usize>(points: [Vec3; N], error: Vec3) -> Aabb {
-    let Aabb { min, max } = Aabb::of(&points);
+    let Aabb { min, max } = Aabb::of_points(points);
     Aabb { min: (min - error).map(f32::next_down), max: (max + error).map(f32::next_up) }
 }

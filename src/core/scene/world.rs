@@ -223,8 +223,7 @@ impl Scene {
 
     /// Centre and radius of the sphere around everything.
     pub fn bounding_sphere(&self) -> (Vec3, f32) {
-        let crate::accel::Aabb { min, max } = self.accel.bounds();
-        crate::math::Aabb { min, max }.bounding_sphere()
+        self.accel.bounds().bounding_sphere()
     }
 
     /// Chance with which [`choose_emitter`](Self::choose_emitter) picks an emitter.
