@@ -73,7 +73,10 @@ impl Run<'_, '_> {
         let mut report = Report::default();
         let in_one_pass = matches!(cx.order, SampleOrder::Reference { .. });
         for pass in 0.. {
-            let (start, end) = if in_one_pass { (0, asked) } else { Schedule::pass(pass) };
+            let (start, end) = match in_one_pass {
+                true => (report.spp, asked),
+                false => Schedule::pass(pass),
+            };
             let end = end.min(asked);
             if start >= end || (pass > 0 && cx.control.should_stop()) {
                 break;
