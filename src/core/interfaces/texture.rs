@@ -3,6 +3,7 @@
 use super::SurfaceHit;
 use crate::color::Rgb;
 use crate::math::Vec2;
+use crate::scene::SpectrumValue;
 use std::sync::Arc;
 
 /// A texture.
@@ -23,6 +24,11 @@ pub trait Texture: Send + Sync {
 
     /// The value if it is the same everywhere.
     fn constant(&self) -> Option<Rgb> {
+        None
+    }
+
+    /// The spectrum, if it is one that the slot reduces to a colour, the same everywhere.
+    fn spectrum(&self) -> Option<&SpectrumValue> {
         None
     }
 

@@ -6,6 +6,7 @@
 //! ```
 
 pub mod check;
+mod clamped;
 pub mod description;
 pub mod error;
 mod instantiate;
