@@ -29,7 +29,7 @@ def bitmap(values):
 
 
 def write(name, lines):
-    text = "\n".join(" ".join([case] + [f"{float(v):.8g}" for v in values]) for case, values in lines)
+    text = "\n".join(" ".join([case] + [f"{float(v):.9g}" for v in values]) for case, values in lines)
     (ROOT / name).write_text(text + "\n")
 
 
@@ -67,5 +67,49 @@ def lights():
             yield case, [*it.p, *u, *ds.d, 0 if far else ds.dist, ds.pdf, *weight]
 
 
+TO_UV = mi.ScalarTransform3f(np.array([[2, 0.5, 0.1], [0.3, -1.5, 0.2], [0, 0, 1]]))
+
+
+def pictures():
+    color, grey, square = pattern(4, 3, 3), pattern(4, 3, 1), pattern(4, 4, 3)
+    data = {"type": "bitmap", "raw": True}
+    for wrap in ("repeat", "mirror", "clamp"):
+        for filter_type in ("bilinear", "nearest"):
+            options = dict(data, wrap_mode=wrap, filter_type=filter_type)
+            yield f"{wrap}_{filter_type}", mi.load_dict(dict(options, bitmap=bitmap(color)))
+    yield "grey", mi.load_dict(dict(data, bitmap=bitmap(grey)))
+    yield "transformed", mi.load_dict(dict(data, bitmap=bitmap(square), to_uv=TO_UV))
+    yield "bytes", mi.load_dict({"type": "bitmap", "bitmap": bitmap((color * 100).astype(np.uint8))})
+    yield "bytes_raw", mi.load_dict(dict(data, bitmap=bitmap((color * 100).astype(np.uint8))))
+    yield "large", mi.load_dict(dict(data, bitmap=bitmap(pattern(3001, 3, 3))))
+
+
+def boards():
+    color0, color1 = ({"type": "rgb", "value": c} for c in ([0.1, 0.2, 0.3], [0.9, 0.6, 0.7]))
+    board = {"type": "checkerboard", "color0": color0, "color1": color1}
+    yield "checkerboard", mi.load_dict(board)
+    yield "checkerboard_transformed", mi.load_dict(dict(board, to_uv=TO_UV))
+
+
+def textures():
+    for case, texture in [*pictures(), *boards()]:
+        for _ in range(10):
+            si = mi.SurfaceInteraction3f()
+            si.uv = rng.uniform(0 if case == "large" else -2.5, 1 if case == "large" else 2.5, 2).astype(np.float32)
+            gradient = texture.eval_1_grad(si) if not case.startswith("checkerboard") else [0, 0]
+            yield case, [*si.uv, *texture.eval(si), texture.eval_1(si), *gradient]
+
+
+def positions():
+    for case, texture in pictures():
+        if case not in ("transformed", "large"):
+            for _ in range(8):
+                u = rng.random(2).astype(np.float32)
+                uv, pdf = texture.sample_position(mi.Point2f(*u))
+                yield case, [*u, *uv, pdf]
+
+
 if __name__ == "__main__":
+    write("textures/golden.txt", textures())
+    write("textures/golden_positions.txt", positions())
     write("emitters/golden.txt", lights())

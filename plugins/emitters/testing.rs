@@ -71,6 +71,7 @@ pub(crate) fn errors(plugin: &str, parameters: Vec<Parameter>) -> String {
 
 /// The values of the test pictures of reference/golden_lights.py, exact in single precision.
 pub(crate) fn pattern(width: u32, height: u32, channels: u32) -> Vec<f32> {
+    let [width, height, channels] = [width, height, channels].map(u64::from);
     (0..width * height * channels)
         .map(|i| {
             let (x, y, c) = (i / channels % width, i / channels / width, i % channels);

@@ -66,7 +66,7 @@ impl Texture for Checkerboard {
 
     fn scalar(&self, hit: &SurfaceHit) -> f32 {
         match &self.colors[1 - self.field(hit)] {
-            ColorSource::Constant(color) => color.luminance(),
+            ColorSource::Constant(color) => color.mean(),
             ColorSource::Textured(texture) => texture.scalar(hit),
         }
     }
@@ -81,5 +81,35 @@ impl Texture for Checkerboard {
             ColorSource::Textured(texture) => texture.maximum(),
         };
         Some(maximum(&self.colors[0])?.max(maximum(&self.colors[1])?))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::emitters::testing::{self, assert_close, golden, matrix, rgb};
+    use lucerna_core::math::{DMat4, Vec2};
+    use lucerna_core::scene::{Object, ObjectKind};
+
+    #[test]
+    fn looks_as_the_reference() {
+        let to_uv = DMat4::from_cols_array_2d(&[
+            [2.0, 0.3, 0.0, 0.0],
+            [0.5, -1.5, 0.0, 0.0],
+            [0.0, 0.0, 1.0, 0.0],
+            [0.1, 0.2, 0.0, 1.0],
+        ]);
+        for (case, to_uv) in [("checkerboard", DMat4::IDENTITY), ("checkerboard_transformed", to_uv)] {
+            let colors = [rgb("color0", [0.1, 0.2, 0.3]), rgb("color1", [0.9, 0.6, 0.7])];
+            let parameters = colors.into_iter().chain([matrix("to_uv", to_uv)]).collect();
+            let Ok(Object::Texture(texture)) = testing::build(ObjectKind::Texture, "checkerboard", parameters) else {
+                panic!("a checkerboard was asked for")
+            };
+            for line in golden(include_str!("golden.txt"), case) {
+                let hit = SurfaceHit { uv: Vec2::from_slice(&line), ..SurfaceHit::default() };
+                let [r, g, b] = texture.color(&hit).to_array();
+                assert_close(&[r, g, b, texture.scalar(&hit)], &line[2..6], case);
+            }
+        }
     }
 }

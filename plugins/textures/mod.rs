@@ -28,3 +28,6 @@ pub const PLUGINS: &[Plugin] = &[
     srgb::PLUGIN,
     uniform::PLUGIN,
 ];
+
+#[cfg(test)]
+pub(crate) use bitmap::tests::slide;

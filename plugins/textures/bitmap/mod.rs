@@ -275,4 +275,4 @@ impl Texture for Bitmap {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

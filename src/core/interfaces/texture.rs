@@ -11,7 +11,7 @@ pub trait Texture: Send + Sync {
     /// Colour at a hit; a single-channel texture gives it in all channels.
     fn color(&self, hit: &SurfaceHit) -> Rgb;
 
-    /// Scalar at a hit; a colour texture gives its luminance.
+    /// Scalar at a hit; a colour texture that varies gives its luminance, a constant the mean of its channels.
     fn scalar(&self, hit: &SurfaceHit) -> f32;
 
     /// Derivative of the scalar with respect to the surface's u and v.

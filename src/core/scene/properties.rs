@@ -256,7 +256,8 @@ impl<'a> Properties<'a> {
     pub fn scalar_opt(&self, name: &str) -> Option<ScalarSource> {
         Some(match self.color_opt(name)? {
             ColorSource::Constant(color) if color.r == color.g && color.g == color.b => ScalarSource::Constant(color.r),
-            ColorSource::Constant(color) => ScalarSource::Constant(color.luminance()),
+            // The mean, as in the reference renderer; a texture that varies gives its luminance.
+            ColorSource::Constant(color) => ScalarSource::Constant(color.mean()),
             ColorSource::Textured(texture) => ScalarSource::Textured(texture),
         })
     }
