@@ -14,6 +14,9 @@ pub mod sensors;
 pub mod shapes;
 pub mod textures;
 
+#[cfg(test)]
+mod testing;
+
 use lucerna_core::scene::Registry;
 
 /// All plugins of this package.

@@ -6,6 +6,7 @@ mod directional;
 mod envmap;
 mod point;
 mod spot;
+mod sunsky;
 #[cfg(test)]
 pub(crate) mod testing;
 
@@ -13,7 +14,7 @@ use lucerna_core::scene::{Param, Plugin};
 
 /// The table of all emitters.
 pub const PLUGINS: &[Plugin] =
-    &[area::PLUGIN, constant::PLUGIN, directional::PLUGIN, envmap::PLUGIN, point::PLUGIN, spot::PLUGIN];
+    &[area::PLUGIN, constant::PLUGIN, directional::PLUGIN, envmap::PLUGIN, point::PLUGIN, spot::PLUGIN, sunsky::PLUGIN];
 
 /// What all emitters accept.
 const COMMON: &[Param] =

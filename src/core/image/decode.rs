@@ -2,6 +2,7 @@
 
 use std::io::Cursor;
 
+use ::image::codecs::hdr::HdrDecoder;
 use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 
 use super::exr::separate;
@@ -24,7 +25,11 @@ fn decode(bytes: &[u8], format: ImageFormat, limits: &ReadLimits) -> Result<Pixe
     decoder_limits.max_image_height = Some(limits.most_side);
     decoder_limits.max_alloc = Some(limits.most_bytes.saturating_mul(2));
     reader.limits(decoder_limits);
-    let decoder = reader.into_decoder().map_err(damaged)?;
+    let decoder: Box<dyn ImageDecoder + '_> = match format {
+        // The other way insists on "#?RADIANCE", but "#?RGBE" is as common.
+        ImageFormat::Hdr => Box::new(HdrDecoder::new_nonstrict(Cursor::new(bytes)).map_err(damaged)?),
+        _ => Box::new(reader.into_decoder().map_err(damaged)?),
+    };
     let (width, height) = decoder.dimensions();
     let pixel_bytes = decoder.color_type().bytes_per_pixel();
     limits.check(width.into(), height.into(), pixel_bytes.into(), bytes.len())?;
@@ -125,6 +130,15 @@ mod tests {
         assert!((value.to_f32(false)[0] - 0.2158).abs() < 1e-4 && (value.to_f32(true)[0] - 0.50196).abs() < 1e-5);
         let bits = decode(b"P1\n3 1\n0 1 0\n");
         assert_eq!((bits.channels, bits.samples), (1, Samples::U8(vec![255, 0, 255])));
+    }
+
+    #[test]
+    fn both_signatures_of_radiance_files_are_known() {
+        for signature in ["RADIANCE", "RGBE"] {
+            let mut bytes = format!("#?{signature}\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n").into_bytes();
+            bytes.extend([128, 64, 0, 129, 128, 128, 128, 128]);
+            assert_eq!(decode(&bytes).samples, Samples::F32(vec![1.0, 0.5, 0.0, 0.5, 0.5, 0.5]));
+        }
     }
 
     #[test]

@@ -14,8 +14,8 @@ use crate::io::{IoError, Result, output};
 /// # Errors
 /// If the file cannot be written or the sizes in `image` do not fit together.
 pub fn write(path: &Path, image: &Image) -> Result<()> {
-    // The largest number with a shared exponent; `max` drops NaN.
-    let storable = |value: f32| value.max(0.0).min(1.69e38);
+    // The upper end is the largest number with a shared exponent.
+    let storable = |value: f32| if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.69e38) };
     let pixels: Vec<Rgb<f32>> = image.rgb()?.map(|pixel| Rgb(pixel.map(storable))).collect();
     output::replace_file(path, |file| {
         HdrEncoder::new(file)

@@ -17,6 +17,11 @@ pub trait Integrator: Send + Sync {
         Vec::new()
     }
 
+    /// Seconds after which the scene wants rendering to stop.
+    fn timeout(&self) -> Option<f64> {
+        None
+    }
+
     /// The integrator as a forward estimator, if it is one; only these can be nested.
     fn estimator(&self) -> Option<&dyn RadianceEstimator> {
         None

@@ -90,9 +90,9 @@ impl FilmStore {
                 out.extend(r.rgb.to_array());
                 out.push(r.alpha);
             }),
-            PixelFormat::Xyz => (&["X", "Y", "Z"], |r, out| out.extend(to_xyz(r.rgb))),
+            PixelFormat::Xyz => (&["X", "Y", "Z"], |r, out| out.extend(r.rgb.to_xyz())),
             PixelFormat::Xyza => (&["X", "Y", "Z", "A"], |r, out| {
-                out.extend(to_xyz(r.rgb));
+                out.extend(r.rgb.to_xyz());
                 out.push(r.alpha);
             }),
         };
@@ -105,15 +105,6 @@ impl FilmStore {
         }
         (names, data)
     }
-}
-
-/// CIE 1931 XYZ of linear sRGB.
-fn to_xyz(c: Rgb) -> [f32; 3] {
-    [
-        0.412453 * c.r + 0.357580 * c.g + 0.180423 * c.b,
-        0.212671 * c.r + 0.715160 * c.g + 0.072169 * c.b,
-        0.019334 * c.r + 0.119193 * c.g + 0.950227 * c.b,
-    ]
 }
 
 /// The part of the film one tile can reach: its pixels and a border as wide as the filter.

@@ -4,6 +4,7 @@ mod bilinear_2d;
 mod discrete_2d;
 mod distribution;
 mod pcg32;
+pub mod sobol;
 mod stream;
 pub mod warp;
 

@@ -39,7 +39,7 @@ impl Builder for Ploc {
 fn longest_tie(bounds: &[Aabb]) -> usize {
     let total = bounds.iter().fold(Aabb::EMPTY, |all, b| all.union(*b));
     let extent = total.max - total.min;
-    if !(extent.max_element() < MAX_EXTENT) {
+    if extent.max_element() > MAX_EXTENT {
         return usize::MAX;
     }
     let scale = extent.as_dvec3().map(|e| if e > 0.0 { 1.0 / e } else { 0.0 });

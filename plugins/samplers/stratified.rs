@@ -1,0 +1,103 @@
+//! `stratified`: one point in each cell of a square grid.
+//!
+//! | parameter | type | default | meaning |
+//! |---|---|---|---|
+//! | `sample_count` | integer | 4 | samples per pixel, rounded up to a square |
+//! | `seed` | integer | 0 | another number gives other noise |
+//! | `jitter` | boolean | true | random places within the cells, not their centres |
+//!
+//! ```xml
+//! <sampler type="stratified">
+//!     <integer name="sample_count" value="64"/>
+//! </sampler>
+//! ```
+
+use super::permutation::permute;
+use super::{COMMON, Common, Counted, JITTER, dimension_key, in_stratum, jitters, pixel_key};
+use lucerna_core::interfaces::Sampler;
+use lucerna_core::math::{UVec2, Vec2};
+use lucerna_core::sampling::PointSet;
+use lucerna_core::scene::{Built, Constructor, Plugin, Properties};
+use std::sync::Arc;
+
+/// Table entry.
+pub const PLUGIN: Plugin = Plugin {
+    name: "stratified",
+    aliases: &[],
+    summary: "one point in each cell of a grid",
+    params: &[COMMON, JITTER],
+    build: Constructor::Sampler(build),
+};
+
+fn build(p: &Properties<'_>) -> Built<dyn Sampler> {
+    Ok(Arc::new(Stratified { common: Common::new(p, next_square), jitter: p.bool("jitter") }))
+}
+
+/// The next square, at most 65535².
+fn next_square(asked: u32) -> u32 {
+    let side = f64::from(asked.max(1)).sqrt().ceil().min(65535.0) as u32;
+    side * side
+}
+
+struct Stratified {
+    common: Common,
+    jitter: bool,
+}
+
+impl Sampler for Stratified {
+    fn sample_count(&self) -> u32 {
+        self.common.sample_count
+    }
+
+    fn seed(&self) -> u32 {
+        self.common.seed
+    }
+
+    fn round_spp(&self, asked: u32) -> u32 {
+        next_square(asked)
+    }
+
+    fn point_set(&self, seed: u32, spp: u32, _film_size: UVec2) -> Option<Box<dyn PointSet>> {
+        let count = next_square(spp);
+        Some(Box::new(Points { seed, count, side: f64::from(count).sqrt() as u32, jitter: self.jitter }))
+    }
+}
+
+struct Points {
+    seed: u32,
+    count: u32,
+    side: u32,
+    jitter: bool,
+}
+
+impl Points {
+    fn offset(&self, key: u64, sample: u32) -> Vec2 {
+        if self.jitter { jitters(key, sample).into() } else { Vec2::splat(0.5) }
+    }
+}
+
+impl PointSet for Points {
+    fn singles(&self, pixel: UVec2, sample: u32, first: u32, out: &mut [f32]) {
+        let pixel = pixel_key(self.seed, pixel, sample / self.count);
+        let sample = sample % self.count;
+        for (dimension, out) in (first..).zip(out) {
+            let key = dimension_key(pixel, Counted::Singles, dimension);
+            let stratum = permute(sample, self.count, key as u32);
+            *out = in_stratum(stratum, self.offset(key, sample).x, self.count);
+        }
+    }
+
+    fn pairs(&self, pixel: UVec2, sample: u32, first: u32, out: &mut [Vec2]) {
+        let pixel = pixel_key(self.seed, pixel, sample / self.count);
+        let sample = sample % self.count;
+        for (dimension, out) in (first..).zip(out) {
+            let key = dimension_key(pixel, Counted::Pairs, dimension);
+            let cell = permute(sample, self.count, key as u32);
+            let offset = self.offset(key, sample);
+            *out = Vec2::new(
+                in_stratum(cell % self.side, offset.x, self.side),
+                in_stratum(cell / self.side, offset.y, self.side),
+            );
+        }
+    }
+}
