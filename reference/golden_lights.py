@@ -41,6 +41,7 @@ def lights():
     rectangle = {"type": "rectangle", "to_world": T().rotate([1, 0, 0], 180).scale([1.5, 0.5, 1])}
     slide = {"type": "bitmap", "bitmap": bitmap(pattern(4, 3, 3)), "raw": True}
     nearest = dict(slide, filter_type="nearest")
+    small = T().rotate([1, 1, 0], 30).scale(0.2)
     cases = {
         "constant": {"type": "constant", "radiance": color},
         "point": {"type": "point", "position": [1, 2, 3], "intensity": color},
@@ -53,15 +54,22 @@ def lights():
         "area": dict(rectangle, emitter={"type": "area", "radiance": color}),
         "area_bilinear": dict(rectangle, emitter={"type": "area", "radiance": slide}),
         "area_nearest": dict(rectangle, emitter={"type": "area", "radiance": nearest}),
+        "shape_sphere": {"type": "sphere", "radius": 0.3, "emitter": {"type": "area", "radiance": color}},
+        "shape_cylinder": {"type": "cylinder", "radius": 0.3, "emitter": {"type": "area", "radiance": color}},
+        "shape_cube": {"type": "cube", "emitter": {"type": "area", "radiance": color}, "to_world": small},
+        "slide_rectangle": {"type": "rectangle", "flip_normals": True, "emitter": {"type": "area", "radiance": slide}},
+        "slide_disk": {"type": "disk", "flip_normals": True, "emitter": {"type": "area", "radiance": slide}},
+        "slide_sphere": {"type": "sphere", "radius": 0.3, "emitter": {"type": "area", "radiance": slide}},
     }
     for case, description in cases.items():
         owner = mi.load_dict(description)
         far = case in ("constant", "directional") or case.startswith("envmap")
         # A light does not keep its shape alive.
-        light = owner.emitter() if case.startswith("area") else owner
+        on_shape = case.startswith(("area", "shape", "slide"))
+        light = owner.emitter() if on_shape else owner
         for _ in range(12):
             it = mi.Interaction3f()
-            it.p = rng.uniform([-1, -1, -2], [1, 1, -0.5]) if case.startswith("area") else rng.uniform(-1, 1, 3)
+            it.p = rng.uniform([-1, -1, -2], [1, 1, -0.5]) if on_shape else rng.uniform(-1, 1, 3)
             u = rng.random(2).astype(np.float32)
             ds, weight = light.sample_direction(it, mi.Point2f(*u))
             yield case, [*it.p, *u, *ds.d, 0 if far else ds.dist, ds.pdf, *weight]

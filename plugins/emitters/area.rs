@@ -196,7 +196,8 @@ mod tests {
     use super::super::testing;
     use super::*;
     use lucerna_core::accel::{Geometry, Hit, Ray};
-    use lucerna_core::math::Aabb;
+    use lucerna_core::image;
+    use lucerna_core::math::{Aabb, DMat4};
 
     /// The rectangle of reference/golden_lights.py: 3 × 1, facing −z, with v growing towards −y.
     struct Rectangle {
@@ -264,6 +265,40 @@ mod tests {
         for filter in ["bilinear", "nearest"] {
             let slide = crate::textures::slide(filter == "nearest");
             testing::assert_golden(&textured(slide, true), &format!("area_{filter}"));
+        }
+    }
+
+    #[test]
+    fn on_real_shapes_as_the_reference() {
+        use testing::{boolean, float, matrix, rgb, text};
+        let axis = lucerna_core::math::DVec3::new(1.0, 1.0, 0.0).normalize();
+        let turned = DMat4::from_axis_angle(axis, 30f64.to_radians()) * DMat4::from_scale([0.2; 3].into());
+        let shapes = [
+            ("sphere", vec![float("radius", 0.3)]),
+            ("cylinder", vec![float("radius", 0.3)]),
+            ("cube", vec![matrix("to_world", turned)]),
+        ];
+        for (shape, parameters) in shapes {
+            let light = testing::light_of((shape, parameters), vec![rgb("radiance", [3.0, 2.0, 1.0])], None);
+            testing::assert_golden(&*light, &format!("shape_{shape}"));
+        }
+
+        let path = std::env::temp_dir().join(format!("lucerna-slide-{}.pfm", std::process::id()));
+        let mut picture = image::Image::new(4, 3, &["R", "G", "B"]);
+        picture.data = testing::pattern(4, 3, 3);
+        image::write(&path, &picture).unwrap();
+        let shapes = [
+            ("rectangle", boolean("flip_normals", true)),
+            ("disk", boolean("flip_normals", true)),
+            ("sphere", float("radius", 0.3)),
+        ];
+        let name = path.to_str().unwrap();
+        let lights = shapes.map(|(shape, parameter)| {
+            (shape, testing::light_of((shape, vec![parameter]), vec![], Some(vec![text("filename", name)])))
+        });
+        std::fs::remove_file(&path).unwrap();
+        for (shape, light) in lights {
+            testing::assert_golden(&*light, &format!("slide_{shape}"));
         }
     }
 
