@@ -270,8 +270,8 @@ mod tests {
 
     #[test]
     fn on_real_shapes_as_the_reference() {
-        use testing::{boolean, float, matrix, rgb, text};
-        let axis = lucerna_core::math::DVec3::new(1.0, 1.0, 0.0).normalize();
+        use testing::{float, matrix, rgb, text};
+        let axis = lucerna_core::math::DVec3::new(0.6, 0.8, 0.0);
         let turned = DMat4::from_axis_angle(axis, 30f64.to_radians()) * DMat4::from_scale([0.2; 3].into());
         let shapes = [
             ("sphere", vec![float("radius", 0.3)]),
@@ -283,13 +283,14 @@ mod tests {
             testing::assert_golden(&*light, &format!("shape_{shape}"));
         }
 
+        let facing = DMat4::from_rotation_x(std::f64::consts::PI);
         let path = std::env::temp_dir().join(format!("lucerna-slide-{}.pfm", std::process::id()));
         let mut picture = image::Image::new(4, 3, &["R", "G", "B"]);
         picture.data = testing::pattern(4, 3, 3);
         image::write(&path, &picture).unwrap();
         let shapes = [
-            ("rectangle", boolean("flip_normals", true)),
-            ("disk", boolean("flip_normals", true)),
+            ("rectangle", matrix("to_world", facing)),
+            ("disk", matrix("to_world", facing)),
             ("sphere", float("radius", 0.3)),
         ];
         let name = path.to_str().unwrap();

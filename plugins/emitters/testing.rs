@@ -9,10 +9,6 @@ use lucerna_core::scene::{
 use std::path::PathBuf;
 use std::sync::Arc;
 
-pub(crate) fn boolean(name: &str, value: bool) -> Parameter {
-    parameter(name, Value::Boolean(value))
-}
-
 fn parameter(name: &str, value: Value) -> Parameter {
     Parameter { name: name.to_owned(), value, at: Location::file("test.xml") }
 }
