@@ -29,7 +29,7 @@ def bitmap(values):
 
 
 def write(name, lines):
-    text = "\n".join(" ".join([case] + [f"{float(v):.8g}" for v in values]) for case, values in lines)
+    text = "\n".join(" ".join([case] + [f"{float(v):.9g}" for v in values]) for case, values in lines)
     (ROOT / name).write_text(text + "\n")
 
 
@@ -41,6 +41,9 @@ def lights():
     rectangle = {"type": "rectangle", "to_world": T().rotate([1, 0, 0], 180).scale([1.5, 0.5, 1])}
     slide = {"type": "bitmap", "bitmap": bitmap(pattern(4, 3, 3)), "raw": True}
     nearest = dict(slide, filter_type="nearest")
+    small = T().rotate([0.6, 0.8, 0], 30).scale(0.2)
+    # Not by flip_normals, which the reference renderer forgets when it samples a texture.
+    facing = T().rotate([1, 0, 0], 180)
     cases = {
         "constant": {"type": "constant", "radiance": color},
         "point": {"type": "point", "position": [1, 2, 3], "intensity": color},
@@ -53,19 +56,70 @@ def lights():
         "area": dict(rectangle, emitter={"type": "area", "radiance": color}),
         "area_bilinear": dict(rectangle, emitter={"type": "area", "radiance": slide}),
         "area_nearest": dict(rectangle, emitter={"type": "area", "radiance": nearest}),
+        "shape_sphere": {"type": "sphere", "radius": 0.3, "emitter": {"type": "area", "radiance": color}},
+        "shape_cylinder": {"type": "cylinder", "radius": 0.3, "emitter": {"type": "area", "radiance": color}},
+        "shape_cube": {"type": "cube", "emitter": {"type": "area", "radiance": color}, "to_world": small},
+        "slide_rectangle": {"type": "rectangle", "to_world": facing, "emitter": {"type": "area", "radiance": slide}},
+        "slide_disk": {"type": "disk", "to_world": facing, "emitter": {"type": "area", "radiance": slide}},
+        "slide_sphere": {"type": "sphere", "radius": 0.3, "emitter": {"type": "area", "radiance": slide}},
     }
     for case, description in cases.items():
         owner = mi.load_dict(description)
         far = case in ("constant", "directional") or case.startswith("envmap")
         # A light does not keep its shape alive.
-        light = owner.emitter() if case.startswith("area") else owner
+        on_shape = case.startswith(("area", "shape", "slide"))
+        light = owner.emitter() if on_shape else owner
         for _ in range(12):
             it = mi.Interaction3f()
-            it.p = rng.uniform([-1, -1, -2], [1, 1, -0.5]) if case.startswith("area") else rng.uniform(-1, 1, 3)
+            it.p = rng.uniform([-1, -1, -2], [1, 1, -0.5]) if on_shape else rng.uniform(-1, 1, 3)
             u = rng.random(2).astype(np.float32)
             ds, weight = light.sample_direction(it, mi.Point2f(*u))
             yield case, [*it.p, *u, *ds.d, 0 if far else ds.dist, ds.pdf, *weight]
 
 
+TO_UV = mi.ScalarTransform3f(np.array([[2, 0.5, 0.1], [0.3, -1.5, 0.2], [0, 0, 1]]))
+
+
+def pictures():
+    color, grey, square = pattern(4, 3, 3), pattern(4, 3, 1), pattern(4, 4, 3)
+    data = {"type": "bitmap", "raw": True}
+    for wrap in ("repeat", "mirror", "clamp"):
+        for filter_type in ("bilinear", "nearest"):
+            options = dict(data, wrap_mode=wrap, filter_type=filter_type)
+            yield f"{wrap}_{filter_type}", mi.load_dict(dict(options, bitmap=bitmap(color)))
+    yield "grey", mi.load_dict(dict(data, bitmap=bitmap(grey)))
+    yield "transformed", mi.load_dict(dict(data, bitmap=bitmap(square), to_uv=TO_UV))
+    yield "bytes", mi.load_dict({"type": "bitmap", "bitmap": bitmap((color * 100).astype(np.uint8))})
+    yield "bytes_raw", mi.load_dict(dict(data, bitmap=bitmap((color * 100).astype(np.uint8))))
+    yield "large", mi.load_dict(dict(data, bitmap=bitmap(pattern(3001, 3, 3))))
+
+
+def boards():
+    color0, color1 = ({"type": "rgb", "value": c} for c in ([0.1, 0.2, 0.3], [0.9, 0.6, 0.7]))
+    board = {"type": "checkerboard", "color0": color0, "color1": color1}
+    yield "checkerboard", mi.load_dict(board)
+    yield "checkerboard_transformed", mi.load_dict(dict(board, to_uv=TO_UV))
+
+
+def textures():
+    for case, texture in [*pictures(), *boards()]:
+        for _ in range(10):
+            si = mi.SurfaceInteraction3f()
+            si.uv = rng.uniform(0 if case == "large" else -2.5, 1 if case == "large" else 2.5, 2).astype(np.float32)
+            gradient = texture.eval_1_grad(si) if not case.startswith("checkerboard") else [0, 0]
+            yield case, [*si.uv, *texture.eval(si), texture.eval_1(si), *gradient]
+
+
+def positions():
+    for case, texture in pictures():
+        if case not in ("transformed", "large"):
+            for _ in range(8):
+                u = rng.random(2).astype(np.float32)
+                uv, pdf = texture.sample_position(mi.Point2f(*u))
+                yield case, [*u, *uv, pdf]
+
+
 if __name__ == "__main__":
+    write("textures/golden.txt", textures())
+    write("textures/golden_positions.txt", positions())
     write("emitters/golden.txt", lights())

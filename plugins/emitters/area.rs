@@ -190,3 +190,160 @@ impl Emitter for Textured {
         PI * self.shape.area() * self.radiance.mean()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing;
+    use super::*;
+    use lucerna_core::accel::{Geometry, Hit, Ray};
+    use lucerna_core::image;
+    use lucerna_core::math::{Aabb, DMat4};
+
+    /// The rectangle of reference/golden_lights.py: 3 × 1, facing −z, with v growing towards −y.
+    struct Rectangle {
+        /// Whether points are found by their texture coordinates.
+        invertible: bool,
+    }
+
+    const DP_DU: Vec3 = Vec3::new(3.0, 0.0, 0.0);
+    const DP_DV: Vec3 = Vec3::new(0.0, -1.0, 0.0);
+
+    impl Rectangle {
+        fn point(uv: Vec2) -> Vec3 {
+            DP_DU * (uv.x - 0.5) + DP_DV * (uv.y - 0.5)
+        }
+    }
+
+    impl Shape for Rectangle {
+        fn geometry(&self) -> Geometry<'_> {
+            unreachable!("lights do not look at it")
+        }
+
+        fn bounds(&self) -> Aabb {
+            Aabb::of_points([Self::point(Vec2::ZERO), Self::point(Vec2::ONE)])
+        }
+
+        fn area(&self) -> f32 {
+            3.0
+        }
+
+        fn surface(&self, _ray: &Ray, _hit: &Hit) -> SurfaceHit {
+            unreachable!("lights do not trace rays")
+        }
+
+        fn sample_area(&self, u2: Vec2) -> Option<AreaSample> {
+            Some(AreaSample { p: Self::point(u2), p_error: Vec3::ZERO, n: -Vec3::Z, uv: u2, pdf: 1.0 / 3.0 })
+        }
+
+        fn at_uv(&self, uv: Vec2) -> Option<SurfaceHit> {
+            self.invertible.then(|| SurfaceHit {
+                p: Self::point(uv),
+                n: -Vec3::Z,
+                uv,
+                dp_du: DP_DU,
+                dp_dv: DP_DV,
+                ..SurfaceHit::default()
+            })
+        }
+    }
+
+    fn textured(radiance: Arc<dyn Texture>, invertible: bool) -> Textured {
+        let shape: Arc<dyn Shape> = Arc::new(Rectangle { invertible });
+        let by_texture = is_one_to_one(&*shape);
+        assert_eq!(by_texture, invertible);
+        Textured { shape, radiance, by_texture, sampling_weight: 1.0 }
+    }
+
+    fn plain() -> Plain {
+        let shape = Arc::new(Rectangle { invertible: false });
+        Plain { shape, radiance: Rgb::new(3.0, 2.0, 1.0), sampling_weight: 1.0 }
+    }
+
+    #[test]
+    fn samples_as_the_reference() {
+        testing::assert_golden(&plain(), "area");
+        for filter in ["bilinear", "nearest"] {
+            let slide = crate::textures::slide(filter == "nearest");
+            testing::assert_golden(&textured(slide, true), &format!("area_{filter}"));
+        }
+    }
+
+    #[test]
+    fn on_real_shapes_as_the_reference() {
+        use testing::{float, matrix, rgb, text};
+        let axis = lucerna_core::math::DVec3::new(0.6, 0.8, 0.0);
+        let turned = DMat4::from_axis_angle(axis, 30f64.to_radians()) * DMat4::from_scale([0.2; 3].into());
+        let shapes = [
+            ("sphere", vec![float("radius", 0.3)]),
+            ("cylinder", vec![float("radius", 0.3)]),
+            ("cube", vec![matrix("to_world", turned)]),
+        ];
+        for (shape, parameters) in shapes {
+            let light = testing::light_of((shape, parameters), vec![rgb("radiance", [3.0, 2.0, 1.0])], None);
+            testing::assert_golden(&*light, &format!("shape_{shape}"));
+        }
+
+        let facing = DMat4::from_rotation_x(std::f64::consts::PI);
+        let path = std::env::temp_dir().join(format!("lucerna-slide-{}.pfm", std::process::id()));
+        let mut picture = image::Image::new(4, 3, &["R", "G", "B"]);
+        picture.data = testing::pattern(4, 3, 3);
+        image::write(&path, &picture).unwrap();
+        let shapes = [
+            ("rectangle", matrix("to_world", facing)),
+            ("disk", matrix("to_world", facing)),
+            ("sphere", float("radius", 0.3)),
+        ];
+        let name = path.to_str().unwrap();
+        let lights = shapes.map(|(shape, parameter)| {
+            (shape, testing::light_of((shape, vec![parameter]), vec![], Some(vec![text("filename", name)])))
+        });
+        std::fs::remove_file(&path).unwrap();
+        for (shape, light) in lights {
+            testing::assert_golden(&*light, &format!("slide_{shape}"));
+        }
+    }
+
+    #[test]
+    fn densities_agree_and_the_irradiance_is_the_same_whatever_is_sampled() {
+        let from = Vec3::new(0.3, -0.2, -1.0);
+        let slide = crate::textures::slide(false);
+        let (by_texture, by_area) = (textured(slide.clone(), true), textured(slide, false));
+        let lights: [&dyn Emitter; 3] = [&by_texture, &by_area, &plain()];
+        let irradiance = lights.map(|light| {
+            let mut rng = Pcg32::new(4, 1);
+            let mut sum = 0.0;
+            const N: usize = 40_000;
+            for _ in 0..N {
+                let sample = light.sample_direct(from, Vec2::new(rng.next_f32(), rng.next_f32())).unwrap();
+                let pdf = light.pdf_direct(from, &sample.point);
+                assert!((pdf - sample.pdf).abs() <= 1e-3 * pdf, "{pdf} is not {}", sample.pdf);
+                let hit = SurfaceHit { uv: sample.point.uv, ..SurfaceHit::default() };
+                let difference = light.radiance(&hit).luminance() - sample.weight.luminance() * sample.pdf;
+                assert!(difference.abs() < 1e-4);
+                sum += sample.weight.luminance() * sample.point.d.z / N as f32;
+            }
+            sum
+        });
+        assert!((irradiance[0] / irradiance[1] - 1.0).abs() < 0.01, "{irradiance:?}");
+        // Cosine at the light times area over the square of the distance, from afar.
+        let far = Vec3::new(0.0, 0.0, -1000.0);
+        let sample = plain().sample_direct(far, Vec2::splat(0.5)).unwrap();
+        assert!((sample.weight.r / 3.0 - 3e-6).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_back_is_dark() {
+        let light = plain();
+        let behind = Vec3::new(0.0, 0.0, 1.0);
+        assert!(light.sample_direct(behind, Vec2::splat(0.3)).is_none());
+        let hit = SurfaceHit { n: -Vec3::Z, ..SurfaceHit::default() };
+        let point = LightPoint::of_hit(behind, &hit, -Vec3::Z);
+        assert_eq!(light.pdf_direct(behind, &point), 0.0);
+        assert!(light.radiance(&SurfaceHit { wi: -Vec3::Z, ..hit }).is_black());
+    }
+
+    #[test]
+    fn needs_a_shape() {
+        assert!(testing::errors("area", vec![]).contains("nested in the shape"));
+    }
+}

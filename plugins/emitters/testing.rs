@@ -1,11 +1,10 @@
 //! What the tests of emitters and textures share.
 
-use crate::emitters;
 use lucerna_core::interfaces::{Emitter, LightPoint};
 use lucerna_core::math::{DMat4, Vec2, Vec3};
 use lucerna_core::sampling::{Pcg32, warp};
 use lucerna_core::scene::{
-    Description, Location, Node, NodeId, Object, ObjectKind, Parameter, Registry, SceneErrors, Value, build_one,
+    Description, Location, Node, NodeId, Object, ObjectKind, Parameter, SceneErrors, Value, build_one,
 };
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -36,25 +35,54 @@ pub(crate) fn text(name: &str, value: &str) -> Parameter {
 
 /// An object of a plugin of this package.
 pub(crate) fn build(kind: ObjectKind, plugin: &str, parameters: Vec<Parameter>) -> Result<Object, SceneErrors> {
-    let node = Node {
+    build_nested(vec![node(kind, plugin, parameters)])
+}
+
+/// The light of a shape, made of both their parameters; the light may have a texture.
+pub(crate) fn light_of(
+    shape: (&str, Vec<Parameter>),
+    mut light: Vec<Parameter>,
+    texture: Option<Vec<Parameter>>,
+) -> Arc<dyn Emitter> {
+    let child = |name: &str, index| parameter(name, Value::Object(NodeId(index)));
+    let mut nodes = vec![node(ObjectKind::Shape, shape.0, shape.1), node(ObjectKind::Emitter, "area", Vec::new())];
+    nodes[0].parameters.push(child("_arg_0", 1));
+    if let Some(texture) = texture {
+        light.push(child("radiance", 2));
+        nodes.push(node(ObjectKind::Texture, "bitmap", texture));
+    }
+    nodes[1].parameters = light;
+    match build_nested(nodes) {
+        Ok(Object::Shape(built)) => built.emitter.expect("the shape has a light"),
+        Ok(_) => unreachable!("a shape was asked for"),
+        Err(errors) => panic!("{errors}"),
+    }
+}
+
+fn node(kind: ObjectKind, plugin: &str, parameters: Vec<Parameter>) -> Node {
+    Node {
         kind,
         plugin: plugin.to_owned(),
         id: None,
         parameters,
         at: Location::file("test.xml"),
         included_from: Vec::new(),
-    };
+    }
+}
+
+/// The first node, which nests the others.
+fn build_nested(nodes: Vec<Node>) -> Result<Object, SceneErrors> {
     let description = Description {
-        nodes: vec![node],
+        nodes,
         root: NodeId(0),
         version: [3, 0, 0],
         search_path: vec![PathBuf::from(".")],
         notes: Vec::new(),
         warnings: Vec::new(),
+        confined_to: None,
+        file_versions: Vec::new(),
     };
-    let mut registry = Registry::new();
-    registry.add_all(emitters::PLUGINS).add_all(crate::textures::PLUGINS);
-    build_one(&registry, &description)
+    build_one(&crate::builtin(), &description)
 }
 
 pub(crate) fn emitter(plugin: &str, parameters: Vec<Parameter>) -> Result<Arc<dyn Emitter>, SceneErrors> {
@@ -71,6 +99,7 @@ pub(crate) fn errors(plugin: &str, parameters: Vec<Parameter>) -> String {
 
 /// The values of the test pictures of reference/golden_lights.py, exact in single precision.
 pub(crate) fn pattern(width: u32, height: u32, channels: u32) -> Vec<f32> {
+    let [width, height, channels] = [width, height, channels].map(u64::from);
     (0..width * height * channels)
         .map(|i| {
             let (x, y, c) = (i / channels % width, i / channels / width, i % channels);

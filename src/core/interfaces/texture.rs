@@ -3,6 +3,7 @@
 use super::SurfaceHit;
 use crate::color::Rgb;
 use crate::math::Vec2;
+use crate::scene::SpectrumValue;
 use std::sync::Arc;
 
 /// A texture.
@@ -10,7 +11,7 @@ pub trait Texture: Send + Sync {
     /// Colour at a hit; a single-channel texture gives it in all channels.
     fn color(&self, hit: &SurfaceHit) -> Rgb;
 
-    /// Scalar at a hit; a colour texture gives its luminance.
+    /// Scalar at a hit; a colour texture that varies gives its luminance, a constant the mean of its channels.
     fn scalar(&self, hit: &SurfaceHit) -> f32;
 
     /// Derivative of the scalar with respect to the surface's u and v.
@@ -23,6 +24,11 @@ pub trait Texture: Send + Sync {
 
     /// The value if it is the same everywhere.
     fn constant(&self) -> Option<Rgb> {
+        None
+    }
+
+    /// The spectrum, if it is one that the slot reduces to a colour, the same everywhere.
+    fn spectrum(&self) -> Option<&SpectrumValue> {
         None
     }
 

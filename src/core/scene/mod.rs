@@ -9,6 +9,7 @@
 //! that it refers to.
 
 pub mod check;
+mod clamped;
 pub mod description;
 pub mod error;
 mod instantiate;

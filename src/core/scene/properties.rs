@@ -5,6 +5,7 @@
 //! constructor can find out (a damaged file, two parameters that exclude each other) it tells with
 //! [`Properties::error`].
 
+use super::clamped::Clamped;
 use super::description::{Description, Node, ObjectKind, SpectrumValue, Value};
 use super::error::{Location, SceneError};
 use super::object::{BuiltShape, Object};
@@ -226,9 +227,10 @@ impl<'a> Properties<'a> {
             unreachable!("\"{name}\" of plugin \"{}\" is no colour", self.plugin.name)
         };
         if let Some(texture) = self.texture_in(name) {
-            return Some(match texture.constant() {
-                Some(color) => ColorSource::Constant(color),
-                None => ColorSource::Textured(texture),
+            return Some(match (texture.spectrum(), texture.constant()) {
+                (Some(spectrum), _) => ColorSource::Constant(self.spectrum_color(name, spectrum, slot)),
+                (None, Some(color)) => ColorSource::Constant(color),
+                (None, None) => ColorSource::Textured(self.bounded(name, texture, slot)),
             });
         }
         let constant = match (self.value(name), spec.default) {
@@ -250,7 +252,8 @@ impl<'a> Properties<'a> {
     pub fn scalar_opt(&self, name: &str) -> Option<ScalarSource> {
         Some(match self.color_opt(name)? {
             ColorSource::Constant(color) if color.r == color.g && color.g == color.b => ScalarSource::Constant(color.r),
-            ColorSource::Constant(color) => ScalarSource::Constant(color.luminance()),
+            // The mean, as in the reference renderer; a texture that varies gives its luminance.
+            ColorSource::Constant(color) => ScalarSource::Constant(color.mean()),
             ColorSource::Textured(texture) => ScalarSource::Textured(texture),
         })
     }
@@ -265,14 +268,27 @@ impl<'a> Properties<'a> {
             Value::Float(v) => Rgb::splat(*v as f32),
             Value::Integer(v) => Rgb::splat(*v as f32),
             Value::Rgb(c) => Rgb::from_f64(*c),
-            Value::Spectrum(s) => {
-                let (color, clipped) = spectrum::to_rgb(s, slot);
-                if clipped {
-                    self.warn(name, "the spectrum is outside the RGB gamut of the slot and was clipped");
-                }
-                color
-            }
+            Value::Spectrum(s) => self.spectrum_color(name, s, slot),
             _ => Rgb::BLACK,
+        }
+    }
+
+    fn spectrum_color(&self, name: &str, spectrum: &SpectrumValue, slot: Slot) -> Rgb {
+        let (color, clipped) = spectrum::to_rgb(spectrum, slot);
+        if clipped {
+            self.warn(name, "the spectrum is outside the RGB gamut of the slot and was clipped");
+        }
+        color
+    }
+
+    /// A reflectance above 1 would make light out of nothing: it is clamped.
+    fn bounded(&self, name: &str, texture: Arc<dyn Texture>, slot: Slot) -> Arc<dyn Texture> {
+        match texture.maximum() {
+            Some(max) if max > 1.0 && slot == Slot::Reflectance => {
+                self.warn(name, format!("the texture of \"{name}\" reaches {max} and is clamped to 1"));
+                Arc::new(Clamped(texture))
+            }
+            _ => texture,
         }
     }
 
