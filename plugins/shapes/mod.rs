@@ -73,3 +73,6 @@ fn enclose<const N: usize>(points: [Vec3; N], error: Vec3) -> Aabb {
     let Aabb { min, max } = Aabb::of(&points);
     Aabb { min: (min - error).map(f32::next_down), max: (max + error).map(f32::next_up) }
 }
+
+#[cfg(test)]
+mod tests;
