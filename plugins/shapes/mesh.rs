@@ -1,9 +1,9 @@
 //! Triangle meshes in world space: what all mesh plugins share.
 
+use super::point_error;
 use lucerna_core::accel::{Accel, BuildOptions, Geometry, Hit, Ray};
 use lucerna_core::interfaces::{AreaSample, Shape, SurfaceHit};
 use lucerna_core::io::{self, MeshAttribute, TriangleMesh};
-use lucerna_core::math::error_bounds::gamma;
 use lucerna_core::math::{Aabb, DMat4, DVec3, Frame, Vec2, Vec3, coordinate_system};
 use lucerna_core::sampling::{Discrete, warp};
 use lucerna_core::scene::{Failed, Properties};
@@ -38,7 +38,7 @@ struct Corner {
 impl Corner {
     fn point(&self) -> (Vec3, Vec3) {
         let [p0, p1, p2] = [self.p[0] * self.b[0], self.p[1] * self.b[1], self.p[2] * self.b[2]];
-        (p0 + p1 + p2, (p0.abs() + p1.abs() + p2.abs()) * gamma(7))
+        (p0 + p1 + p2, point_error(p0.abs() + p1.abs() + p2.abs(), 7))
     }
 
     /// Unit normal by winding; zero for a triangle without area.

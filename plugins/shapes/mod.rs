@@ -17,6 +17,7 @@ mod sphere;
 
 use lucerna_core::accel::{Aabb, Hit, PrimHit, Ray};
 use lucerna_core::math::Vec3;
+use lucerna_core::math::error_bounds::gamma;
 use lucerna_core::scene::description::ObjectKind;
 use lucerna_core::scene::{Param, Plugin};
 
@@ -66,6 +67,16 @@ fn nearest_root(ray: &Ray, roots: [f64; 2], on_surface: impl Fn(f64) -> bool) ->
 #[inline]
 fn taken_root(hit: &Hit, roots: Option<[f64; 2]>) -> f64 {
     roots.map_or(f64::from(hit.t), |roots| roots[usize::from(hit.u > 0.0)])
+}
+
+/// Bound on the error of a point of a plane or triangle: the sum of terms of the given `size` after some roundings.
+///
+/// Where a coordinate is 0 it has no relative error, but the double-precision distance to the plane still has one, of
+/// the order of the other coordinates. Without the last term a ray could meet the floor y = 0 that it starts on.
+#[inline]
+fn point_error(size: Vec3, roundings: u32) -> Vec3 {
+    const DOUBLE: f32 = 1.0 / (1u64 << 40) as f32;
+    size * gamma(roundings) + Vec3::splat(size.max_element() * DOUBLE)
 }
 
 /// A box around points that are known to an error on each axis.

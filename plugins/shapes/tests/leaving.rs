@@ -2,8 +2,9 @@
 
 use super::{Traced, draft, placement, shape, uniform};
 use lucerna_core::interfaces::AreaSample;
-use lucerna_core::math::{DVec3, Frame, error_bounds};
+use lucerna_core::math::{DMat4, DVec3, Frame, error_bounds};
 use lucerna_core::sampling::{Pcg32, warp};
+use std::f64::consts::FRAC_PI_2;
 
 const PLACEMENTS: usize = 1000;
 const RAYS: usize = 200;
@@ -91,7 +92,7 @@ fn hc_g15_far_spheres_are_round() {
     let mut pcg = Pcg32::new(5, 2);
     for distance in [1e4, 1e6] {
         let center = warp::square_to_sphere(uniform(&mut pcg)) * distance;
-        let sphere = draft("sphere").to_world(glam::DMat4::from_translation(center.as_dvec3()));
+        let sphere = draft("sphere").to_world(DMat4::from_translation(center.as_dvec3()));
         let traced = Traced::new(shape(&sphere));
         let frame = Frame::from_normal(center / distance);
         let (rays, mut hits) = (100_000, 0);
@@ -116,8 +117,8 @@ fn hc_g15_far_spheres_are_round() {
 #[test]
 fn hc_g04_thin_gaps_stay_open() {
     for size in [1e-3f64, 1.0, 1e6] {
-        let scale = glam::DMat4::from_scale(DVec3::splat(size));
-        let up = glam::DMat4::from_translation(DVec3::Z * 1e-4 * size.min(1.0)) * scale;
+        let scale = DMat4::from_scale(DVec3::splat(size));
+        let up = DMat4::from_translation(DVec3::Z * 1e-4 * size.min(1.0)) * scale;
         let floor = Traced::new(shape(&draft("rectangle").to_world(scale)));
         let roof = Traced::new(shape(&draft("rectangle").to_world(up)));
         let mut pcg = Pcg32::new(1, 1);
@@ -126,10 +127,34 @@ fn hc_g04_thin_gaps_stay_open() {
             let b = roof.shape.sample_area(uniform(&mut pcg)).expect("a point");
             let from = error_bounds::offset_origin(a.p, a.p_error, a.n, b.p - a.p);
             let to = error_bounds::offset_origin(b.p, b.p_error, b.n, from - b.p);
+            let segment = lucerna_core::accel::Ray::between(from, to);
             for traced in [&floor, &roof] {
-                let segment = lucerna_core::accel::Ray::between(from, to);
                 assert!(!traced.accel.occluded(&segment), "size {size}: {from} to {to}");
             }
         }
     }
+}
+
+/// In a plane through the origin one coordinate is exactly 0, and so is its relative rounding error.
+#[test]
+fn planes_through_the_origin_are_left_too() {
+    let mut pcg = Pcg32::new(2, 1);
+    let mut tally = Tally::default();
+    for plugin in ["rectangle", "disk", "obj"] {
+        for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+            for scale in [1e-6, 1.0, 1e6] {
+                let turn = if axis == DVec3::Z { DMat4::IDENTITY } else { DMat4::from_axis_angle(axis, FRAC_PI_2) };
+                let matrix = turn * DMat4::from_scale(DVec3::splat(scale));
+                // Exact zeros, not what the cosine of 90 degrees rounds to.
+                let exact = matrix.to_cols_array().map(|v| if v.abs() < 1e-10 * scale { 0.0 } else { v });
+                let mut draft = draft(plugin).to_world(DMat4::from_cols_array(&exact));
+                if plugin == "obj" {
+                    draft = draft.string("filename", "flat.obj");
+                }
+                leave(&Traced::new(shape(&draft)), &mut pcg, true, &mut tally);
+            }
+        }
+    }
+    assert!(tally.hits > 3 * 9 * RAYS * 9 / 10);
+    assert_eq!(tally.bad, 0, "of {}", tally.hits);
 }
