@@ -1,1 +1,26 @@
-//! Lucerna.
+//! Lucerna renders existing Mitsuba scenes on the CPU.
+//!
+//! This package is the program and a facade over the two floors below it: [`core`] (what a plugin is written
+//! against) and [`plugins`] (what a scene can choose). A program with plugins of its own adds them to a registry and
+//! hands it to [`run`]:
+//!
+//! ```no_run
+//! let mut registry = lucerna::builtin();
+//! // registry.add(my_integrator::PLUGIN);
+//! lucerna::run(registry);
+//! ```
+#![forbid(unsafe_code)]
+
+mod cli;
+
+pub use lucerna_core as core;
+pub use lucerna_plugins as plugins;
+pub use lucerna_plugins::builtin;
+
+/// The scene that is rendered when none is named.
+pub const DEFAULT_SCENE: &str = include_str!("../scenes/cornell-box.xml");
+
+/// Runs the command line with the given plugins. 0: done, 2: could not run, 3: bad samples under `--strict-nan`.
+pub fn run(registry: core::scene::Registry) -> std::process::ExitCode {
+    cli::run(&registry)
+}

@@ -13,13 +13,13 @@
 //! </bsdf>
 //! ```
 
+use super::form::{Recipe, bsdf};
 use lucerna_core::color::Rgb;
-use lucerna_core::interfaces::{Arena, Bsdf, Bxdf, BxdfSample, ColorSource, Lobes, SurfaceHit, Transport};
+use lucerna_core::interfaces::{Bsdf, Bxdf, BxdfSample, ColorSource, Lobes, SurfaceHit, Transport};
 use lucerna_core::math::{Vec2, Vec3};
 use lucerna_core::sampling::warp;
 use lucerna_core::scene::{Built, Constructor, Param, Plugin, Properties, Slot};
 use std::f32::consts::FRAC_1_PI;
-use std::sync::Arc;
 
 /// Table entry.
 pub const PLUGIN: Plugin = Plugin {
@@ -31,40 +31,35 @@ pub const PLUGIN: Plugin = Plugin {
 };
 
 fn build(p: &Properties<'_>) -> Built<dyn Bsdf> {
-    Ok(match p.color("reflectance") {
-        ColorSource::Constant(reflectance) => Arc::new(ConstantDiffuse(Diffuse { reflectance })),
-        ColorSource::Textured(_) => Arc::new(TexturedDiffuse { reflectance: p.color("reflectance") }),
-    })
+    Ok(bsdf(Matte { reflectance: p.color("reflectance") }))
 }
 
-/// The same albedo everywhere: the closed form is made once.
-struct ConstantDiffuse(Diffuse);
-
-impl Bsdf for ConstantDiffuse {
-    fn lobes(&self) -> Lobes {
-        Lobes::DIFFUSE_REFLECTION
-    }
-
-    fn resolve<'a>(&'a self, _hit: &SurfaceHit, _arena: &'a Arena) -> &'a dyn Bxdf {
-        &self.0
-    }
-}
-
-struct TexturedDiffuse {
+struct Matte {
     reflectance: ColorSource,
 }
 
-impl Bsdf for TexturedDiffuse {
+impl Recipe for Matte {
+    type Form = Diffuse;
+
     fn lobes(&self) -> Lobes {
         Lobes::DIFFUSE_REFLECTION
     }
 
-    fn resolve<'a>(&'a self, hit: &SurfaceHit, arena: &'a Arena) -> &'a dyn Bxdf {
-        arena.alloc(Diffuse { reflectance: self.reflectance.at(hit) })
+    fn is_constant(&self) -> bool {
+        self.reflectance.constant().is_some()
+    }
+
+    fn at(&self, hit: &SurfaceHit) -> Diffuse {
+        Diffuse { reflectance: self.reflectance.at(hit) }
+    }
+
+    fn diffuse_reflectance(&self, hit: &SurfaceHit) -> Option<Rgb> {
+        Some(self.reflectance.at(hit))
     }
 }
 
 /// Lambertian reflection with a known albedo.
+#[derive(Clone, Copy)]
 struct Diffuse {
     reflectance: Rgb,
 }

@@ -1,6 +1,16 @@
 //! All integrators: one file each, one line each in [`PLUGINS`].
 
+mod aov;
+mod common;
+mod depth;
+mod direct;
+mod moment;
+mod path;
+mod volpath;
+mod volpathmis;
+
 use lucerna_core::scene::Plugin;
 
 /// The table of all integrators.
-pub const PLUGINS: &[Plugin] = &[];
+pub const PLUGINS: &[Plugin] =
+    &[path::PLUGIN, direct::PLUGIN, volpath::PLUGIN, volpathmis::PLUGIN, depth::PLUGIN, aov::PLUGIN, moment::PLUGIN];

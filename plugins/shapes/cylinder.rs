@@ -19,7 +19,7 @@
 //! ```
 
 use super::{COMMON, ORIENTED, enclose, nearest_root, taken_root};
-use lucerna_core::accel::{Aabb as Box3, Geometry, Hit, PrimHit, Primitive, Ray};
+use lucerna_core::accel::{Geometry, Hit, PrimHit, Primitive, Ray};
 use lucerna_core::interfaces::{AreaSample, Shape, SurfaceHit};
 use lucerna_core::math::error_bounds::gamma;
 use lucerna_core::math::{Aabb, DMat4, DVec3, Frame, Vec2, Vec3, coordinate_system};
@@ -111,7 +111,7 @@ impl Tube {
 }
 
 impl Primitive for Tube {
-    fn bounds(&self) -> Box3 {
+    fn bounds(&self) -> Aabb {
         let [x, y] = [self.to_world.x_axis, self.to_world.y_axis].map(|a| a.truncate());
         let reach = (x * x + y * y).map(f64::sqrt).as_vec3();
         let [p0, p1] = [DVec3::ZERO, DVec3::Z].map(|p| self.to_world.transform_point3(p).as_vec3());
@@ -163,8 +163,7 @@ impl Shape for Cylinder {
     }
 
     fn bounds(&self) -> Aabb {
-        let Box3 { min, max } = self.tube.bounds();
-        Aabb { min, max }
+        self.tube.bounds()
     }
 
     fn area(&self) -> f32 {

@@ -16,7 +16,7 @@
 
 use super::plane::Plane;
 use super::{COMMON, ORIENTED, enclose};
-use lucerna_core::accel::{Aabb as Box3, Geometry, Hit, PrimHit, Primitive, Ray};
+use lucerna_core::accel::{Geometry, Hit, PrimHit, Primitive, Ray};
 use lucerna_core::interfaces::{AreaSample, Shape, SurfaceHit};
 use lucerna_core::math::{Aabb, Vec2};
 use lucerna_core::sampling::warp;
@@ -38,7 +38,7 @@ fn build(p: &Properties<'_>) -> Built<dyn Shape> {
 }
 
 impl Primitive for Plane {
-    fn bounds(&self) -> Box3 {
+    fn bounds(&self) -> Aabb {
         // An ellipse with half axes x and y reaches √(x² + y²) along each axis of the world.
         let reach = (self.x * self.x + self.y * self.y).map(f32::sqrt);
         enclose([self.center - reach, self.center + reach], self.point(Vec2::ONE).1)
@@ -87,8 +87,7 @@ impl Shape for Disk {
     }
 
     fn bounds(&self) -> Aabb {
-        let Box3 { min, max } = self.0.bounds();
-        Aabb { min, max }
+        self.0.bounds()
     }
 
     fn area(&self) -> f32 {

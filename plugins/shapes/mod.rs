@@ -7,17 +7,19 @@
 mod cube;
 mod cylinder;
 mod disk;
+mod instance;
 mod mesh;
 mod obj;
 mod plane;
 mod ply;
 mod rectangle;
 mod serialized;
+mod shapegroup;
 mod sphere;
 
-use lucerna_core::accel::{Aabb, Hit, PrimHit, Ray};
-use lucerna_core::math::Vec3;
+use lucerna_core::accel::{Hit, PrimHit, Ray};
 use lucerna_core::math::error_bounds::gamma;
+use lucerna_core::math::{Aabb, Vec3};
 use lucerna_core::scene::description::ObjectKind;
 use lucerna_core::scene::{Param, Plugin};
 
@@ -26,10 +28,12 @@ pub const PLUGINS: &[Plugin] = &[
     cube::PLUGIN,
     cylinder::PLUGIN,
     disk::PLUGIN,
+    instance::PLUGIN,
     obj::PLUGIN,
     ply::PLUGIN,
     rectangle::PLUGIN,
     serialized::PLUGIN,
+    shapegroup::PLUGIN,
     sphere::PLUGIN,
 ];
 
@@ -81,7 +85,7 @@ fn point_error(size: Vec3, roundings: u32) -> Vec3 {
 
 /// A box around points that are known to an error on each axis.
 fn enclose<const N: usize>(points: [Vec3; N], error: Vec3) -> Aabb {
-    let Aabb { min, max } = Aabb::of(&points);
+    let Aabb { min, max } = Aabb::of_points(points);
     Aabb { min: (min - error).map(f32::next_down), max: (max + error).map(f32::next_up) }
 }
 

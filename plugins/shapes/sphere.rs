@@ -20,7 +20,7 @@
 //! ```
 
 use super::{COMMON, ORIENTED, enclose, nearest_root, taken_root};
-use lucerna_core::accel::{Aabb as Box3, Geometry, Hit, PrimHit, Primitive, Ray};
+use lucerna_core::accel::{Geometry, Hit, PrimHit, Primitive, Ray};
 use lucerna_core::interfaces::{AreaSample, LightPoint, Shape, SurfaceHit};
 use lucerna_core::math::error_bounds::gamma;
 use lucerna_core::math::{Aabb, DMat4, DVec3, Frame, Vec2, Vec3, coordinate_system};
@@ -108,7 +108,7 @@ impl Ball {
 }
 
 impl Primitive for Ball {
-    fn bounds(&self) -> Box3 {
+    fn bounds(&self) -> Aabb {
         let (c, r) = (self.center, Vec3::splat(self.radius));
         enclose([c - r, c + r], self.error(c.abs() + r))
     }
@@ -211,8 +211,7 @@ impl Shape for Sphere {
     }
 
     fn bounds(&self) -> Aabb {
-        let Box3 { min, max } = self.ball.bounds();
-        Aabb { min, max }
+        self.ball.bounds()
     }
 
     fn area(&self) -> f32 {

@@ -2,8 +2,7 @@
 //!
 //! The core knows no plugin by name. It offers mathematics ([`math`]), sampling ([`sampling`]), colour ([`color`]),
 //! the traits a plugin implements ([`interfaces`]), the way from an XML file to a scene ([`scene`]), ray
-//! acceleration ([`accel`]), the pass and tile loop ([`render`]), image and mesh files ([`image`], [`io`]) and the
-//! statistics that tests and comparisons rest on ([`stats`]).
+//! acceleration ([`accel`]), the pass and tile loop ([`render`]), and image and mesh files ([`image`], [`io`]).
 //!
 //! The conventions that every module shares are stated once, in [`interfaces`].
 #![deny(unsafe_code)]
@@ -17,3 +16,4 @@ pub mod math;
 pub mod render;
 pub mod sampling;
 pub mod scene;
+pub mod stats;

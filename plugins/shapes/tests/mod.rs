@@ -1,6 +1,7 @@
 //! Tests of all shapes together.
 
 mod golden;
+mod groups;
 mod leaving;
 mod sampling;
 mod special;

@@ -67,19 +67,19 @@ impl Choice {
         best.cost[0] = as_node;
         best.left[0] = FEWER;
         let as_pack = PACK_COST * area;
-        if best.triangles && count as usize <= WIDTH && !(as_pack > as_node) {
+        if best.triangles && count as usize <= WIDTH && as_pack <= as_node {
             best.cost[0] = as_pack;
             best.left[0] = LEAF;
         }
-        for j in 1..WIDTH {
-            let (cost, k) = shared[j];
+        for (j, (cost, k)) in shared.into_iter().enumerate().skip(1) {
             (best.cost[j], best.left[j]) = if cost < best.cost[j - 1] { (cost, k) } else { (best.cost[j - 1], FEWER) };
         }
         best
     }
 }
 
-/// Collapses `tree`, which must not be empty. `pack_of` tells triangles (`None`) from the others (`Some`: their index).
+/// Collapses `tree`, which must not be empty. `analytic` tells triangles (`None`) from the others
+/// (`Some`: their index).
 pub fn collapse(tree: &BinaryTree, frame: &Frame, analytic: &(dyn Fn(u32) -> Option<u32> + Sync)) -> Collapsed {
     let mut choices = vec![Choice::UNSET; tree.nodes.len()];
     let (root, block) = choices.split_at_mut(1);

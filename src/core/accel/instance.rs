@@ -1,6 +1,7 @@
 //! One group of shapes, placed many times.
 
-use super::{Aabb, Accel, PrimHit, Primitive, Ray};
+use super::{Accel, PrimHit, Primitive, Ray};
+use crate::math::Aabb;
 use glam::{Affine3A, DAffine3, DVec3};
 use std::sync::Arc;
 

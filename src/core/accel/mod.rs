@@ -12,7 +12,6 @@
 //!   the builder, the number of threads or the processor.
 //! * Triangles without area or with non-finite vertices are left out and counted in [`Stats::degenerate`].
 
-mod aabb;
 pub mod builders;
 mod collapse;
 mod instance;
@@ -24,11 +23,11 @@ mod triangle;
 mod validate;
 mod wide;
 
-pub use aabb::Aabb;
 pub use instance::Instance;
 pub use primitive::{PrimHit, Primitive};
 pub use ray::{Hit, NO_INSTANCE, Ray};
 
+use crate::math::Aabb;
 use builders::Builder;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -190,7 +189,7 @@ impl Accel {
         };
         let mut hit = traverse::closest(&self.tree, self.path, &scaled).map(|found| self.hit(found))?;
         hit.t = (f64::from(hit.t) / scale) as f32;
-        (ray.t_min < hit.t && hit.t < ray.t_max).then_some(hit)
+        (ray.t_min.max(0.0) < hit.t && hit.t < ray.t_max).then_some(hit)
     }
 
     /// Whether anything is hit with `t_min < t < t_max`. Quicker than [`Accel::intersect`].
@@ -252,6 +251,8 @@ impl Accel {
     }
 }
 
+/// The exponent of an `f64`; alone, it is the power of two below the number.
+const EXPONENT: u64 = 0x7FF0_0000_0000_0000;
 const TOO_MANY: &str = "more than 2^30 primitives in one scene or group";
 
 /// Appends the bounds and numbers of all triangles that can be hit.
@@ -268,7 +269,7 @@ fn collect_triangles(
     }
     into.par_extend(triangles.par_iter().enumerate().filter_map(|(i, corners)| {
         let points = corners.map(|i| positions[i as usize]);
-        triangle::is_hittable(points).then(|| (Aabb::of(&points), first + i as u32))
+        triangle::is_hittable(points).then(|| (Aabb::of_points(points), first + i as u32))
     }));
     Ok(())
 }
@@ -281,7 +282,7 @@ fn rescaled(ray: &Ray) -> Option<(Ray, f64)> {
     if (1e-3..=1e3).contains(&longest) {
         return None;
     }
-    let scale = f64::from(longest).log2().floor().exp2();
+    let scale = f64::from_bits(f64::from(longest).to_bits() & EXPONENT);
     let d = (ray.d.as_dvec3() / scale).as_vec3();
     let [t_min, t_max] = [ray.t_min, ray.t_max].map(|t| (f64::from(t) * scale) as f32);
     Some((Ray { o: ray.o, d, t_min, t_max }, scale))

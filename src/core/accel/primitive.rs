@@ -1,6 +1,7 @@
 //! What a leaf of the tree can hold besides triangles.
 
-use super::{Aabb, Ray};
+use super::Ray;
+use crate::math::Aabb;
 
 /// A hit on one [`Primitive`].
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -29,7 +29,7 @@ impl Ray {
         Self { o, d, t_min: 0.0, t_max: f32::INFINITY }
     }
 
-    /// The open segment from `from` to `to`, for visibility tests.
+    /// The open segment from `from` to `to`, for visibility tests. Both ends must have been moved off their surfaces.
     #[must_use]
     pub fn between(from: Vec3, to: Vec3) -> Self {
         Self { o: from, d: to - from, t_min: 0.0, t_max: 1.0 }

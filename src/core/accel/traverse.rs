@@ -8,15 +8,16 @@
 //! # Why no box is missed
 //!
 //! With u = 2⁻²⁴, planes p and origin o relative to the middle of the scene, and S = max |p| + |o|: moving o there is wrong
-//! by u S; the plane's distance (p − o) / d, computed as p · (1/d) − o · (1/d), is off by what moving p by 3 u S would do; and
+//! by u S; the plane's distance (p − o) / d, computed as p · (1/d) − o · (1/d), is off by what moving p by 4 u S would do; and
 //! the triangle test accepts points up to 6 u S beside a triangle, since it rounds the sheared vertices. The rounding of t
 //! adds u S. Each plane is therefore moved outwards by 12 u S, in the constant o · (1/d), at no cost. A direction component
 //! below 10⁻¹⁸ of the largest counts as that; over the length of the scene this shifts the ray by much less than u S.
 
+use super::Primitive;
 use super::ray::Ray;
 use super::triangle::{Shear, TriangleHit};
 use super::wide::{Frame, Node, Pack, WIDTH, Word};
-use super::{Aabb, Primitive};
+use crate::math::Aabb;
 use std::mem::MaybeUninit;
 use std::sync::Arc;
 
@@ -67,7 +68,7 @@ impl Path {
     #[must_use]
     pub fn fastest() -> Self {
         #[cfg(target_arch = "x86_64")]
-        if ["avx2", "fma", "bmi1", "bmi2", "lzcnt", "popcnt"].iter().all(|f| avx2::has(f)) {
+        if avx2::is_available() {
             return Self(Instructions::Avx2);
         }
         Self::PORTABLE
@@ -151,7 +152,8 @@ trait Kernel {
     /// The processor has the instructions of the kernel.
     unsafe fn candidates(beam: &Beam, pack: &Pack) -> u32;
 
-    /// Asks for two cache lines.
+    /// Asks for the first two cache lines of an item, which need not exist.
+    #[inline(always)]
     fn prefetch<T>(_: &[T], _index: usize) {}
 }
 
@@ -196,7 +198,7 @@ impl Kernel for Portable {
             ];
             let negative = (edges[0] < 0.0) | (edges[1] < 0.0) | (edges[2] < 0.0);
             let positive = (edges[0] > 0.0) | (edges[1] > 0.0) | (edges[2] > 0.0);
-            mask |= u32::from(!(negative & positive) & (edges[0] == edges[0])) << i;
+            mask |= u32::from(!(negative & positive) & !edges[0].is_nan()) << i;
         }
         mask
     }
@@ -207,16 +209,13 @@ mod avx2 {
     use super::{Beam, Found, Kernel, Node, Pack, Ray, Shear, Tree, WIDTH, walk};
     use std::arch::x86_64::*;
 
-    pub fn has(feature: &str) -> bool {
-        match feature {
-            "avx2" => is_x86_feature_detected!("avx2"),
-            "fma" => is_x86_feature_detected!("fma"),
-            "bmi1" => is_x86_feature_detected!("bmi1"),
-            "bmi2" => is_x86_feature_detected!("bmi2"),
-            "lzcnt" => is_x86_feature_detected!("lzcnt"),
-            "popcnt" => is_x86_feature_detected!("popcnt"),
-            _ => false,
-        }
+    pub fn is_available() -> bool {
+        is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("fma")
+            && is_x86_feature_detected!("bmi1")
+            && is_x86_feature_detected!("bmi2")
+            && is_x86_feature_detected!("lzcnt")
+            && is_x86_feature_detected!("popcnt")
     }
 
     #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
@@ -229,60 +228,20 @@ mod avx2 {
         walk::<Avx2, true>(tree, ray)
     }
 
-    /// Inlined into the two functions above and used nowhere else.
+    /// Only used in the two functions above.
     struct Avx2;
 
     impl Kernel for Avx2 {
         #[inline(always)]
         unsafe fn boxes(beam: &Beam, node: &Node, t_max: f32, near: &mut [f32; WIDTH]) -> u32 {
-            // SAFETY: the caller has AVX2 and FMA; all loads and the store are of whole arrays of eight floats, and the
-            // rows of a node are aligned to 32 bytes.
-            unsafe {
-                let enter = |axis: usize| {
-                    let planes = _mm256_load_ps(node.rows[beam.near_rows[axis]].as_ptr());
-                    let [inv, offset] = [beam.inv_d[axis], beam.near_offset[axis]].map(|x| _mm256_set1_ps(x));
-                    _mm256_fmsub_ps(planes, inv, offset)
-                };
-                let leave = |axis: usize| {
-                    let planes = _mm256_load_ps(node.rows[beam.far_rows[axis]].as_ptr());
-                    let [inv, offset] = [beam.inv_d[axis], beam.far_offset[axis]].map(|x| _mm256_set1_ps(x));
-                    _mm256_fmsub_ps(planes, inv, offset)
-                };
-                // A NaN in the first operand yields the second: the box counts as entered.
-                let near_xy = _mm256_max_ps(enter(0), _mm256_max_ps(enter(1), _mm256_set1_ps(beam.t_min)));
-                let far_xy = _mm256_min_ps(leave(0), _mm256_min_ps(leave(1), _mm256_set1_ps(t_max)));
-                let entry = _mm256_max_ps(enter(2), near_xy);
-                let exit = _mm256_min_ps(leave(2), far_xy);
-                _mm256_storeu_ps(near.as_mut_ptr(), entry);
-                _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(entry, exit)) as u32
-            }
+            // SAFETY: the caller vouches for the instructions.
+            unsafe { boxes(beam, node, t_max, near) }
         }
 
         #[inline(always)]
         unsafe fn candidates(beam: &Beam, pack: &Pack) -> u32 {
-            let Shear { o, axes, s, .. } = &beam.shear;
-            // SAFETY: the caller has AVX2; all loads are of whole rows, which are aligned to 32 bytes in a pack.
-            unsafe {
-                let [ox, oy, oz, sx, sy] = [o[0], o[1], o[2], s[0], s[1]].map(|x| _mm256_set1_ps(x));
-                let shear = |vertex: usize| {
-                    let [x, y, z] = axes.map(|axis| _mm256_load_ps(pack.vertices[vertex][axis].as_ptr()));
-                    let height = _mm256_sub_ps(z, oz);
-                    (
-                        _mm256_sub_ps(_mm256_sub_ps(x, ox), _mm256_mul_ps(sx, height)),
-                        _mm256_sub_ps(_mm256_sub_ps(y, oy), _mm256_mul_ps(sy, height)),
-                    )
-                };
-                let [(ax, ay), (bx, by), (cx, cy)] = [shear(0), shear(1), shear(2)];
-                let cross = |px, py, qx, qy| _mm256_sub_ps(_mm256_mul_ps(px, qy), _mm256_mul_ps(py, qx));
-                let [u, v, w] = [cross(cx, cy, bx, by), cross(ax, ay, cx, cy), cross(bx, by, ax, ay)];
-                let zero = _mm256_setzero_ps();
-                let either = |e, f, g| _mm256_or_ps(_mm256_or_ps(e, f), g);
-                let [un, vn, wn] = [u, v, w].map(|e| _mm256_cmp_ps::<_CMP_LT_OQ>(e, zero));
-                let [up, vp, wp] = [u, v, w].map(|e| _mm256_cmp_ps::<_CMP_GT_OQ>(e, zero));
-                let both = _mm256_and_ps(either(un, vn, wn), either(up, vp, wp));
-                let occupied = _mm256_cmp_ps::<_CMP_ORD_Q>(u, u);
-                _mm256_movemask_ps(_mm256_andnot_ps(both, occupied)) as u32
-            }
+            // SAFETY: the caller vouches for the instructions.
+            unsafe { candidates(beam, pack) }
         }
 
         #[inline(always)]
@@ -294,6 +253,60 @@ mod avx2 {
                 _mm_prefetch::<_MM_HINT_T0>(line.wrapping_add(64));
             }
         }
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx2,fma")]
+    fn load(row: &[f32; WIDTH]) -> __m256 {
+        // SAFETY: a row is eight floats; no alignment is asked for.
+        unsafe { _mm256_loadu_ps(row.as_ptr()) }
+    }
+
+    /// `row * inv - offset`.
+    #[inline]
+    #[target_feature(enable = "avx2,fma")]
+    fn distances(row: &[f32; WIDTH], inv: f32, offset: f32) -> __m256 {
+        _mm256_fmsub_ps(load(row), _mm256_set1_ps(inv), _mm256_set1_ps(offset))
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx2,fma")]
+    fn boxes(beam: &Beam, node: &Node, t_max: f32, near: &mut [f32; WIDTH]) -> u32 {
+        let enter = |axis: usize| distances(&node.rows[beam.near_rows[axis]], beam.inv_d[axis], beam.near_offset[axis]);
+        let leave = |axis: usize| distances(&node.rows[beam.far_rows[axis]], beam.inv_d[axis], beam.far_offset[axis]);
+        // A NaN in the first operand yields the second: the box counts as entered.
+        let entry = _mm256_max_ps(enter(1), _mm256_max_ps(enter(0), _mm256_set1_ps(beam.t_min)));
+        let exit = _mm256_min_ps(leave(1), _mm256_min_ps(leave(0), _mm256_set1_ps(t_max)));
+        let [entry, exit] = [_mm256_max_ps(enter(2), entry), _mm256_min_ps(leave(2), exit)];
+        // SAFETY: `near` is eight floats; no alignment is asked for.
+        unsafe { _mm256_storeu_ps(near.as_mut_ptr(), entry) };
+        _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(entry, exit)) as u32
+    }
+
+    /// The vertices of one row triple, relative to the ray's origin and sheared.
+    #[inline]
+    #[target_feature(enable = "avx2,fma")]
+    fn sheared(rows: &[[f32; WIDTH]; 3], shear: &Shear) -> (__m256, __m256) {
+        let relative = |i: usize| _mm256_sub_ps(load(&rows[shear.axes[i]]), _mm256_set1_ps(shear.o[i]));
+        let height = relative(2);
+        let moved = |i: usize| _mm256_sub_ps(relative(i), _mm256_mul_ps(_mm256_set1_ps(shear.s[i]), height));
+        (moved(0), moved(1))
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx2,fma")]
+    fn candidates(beam: &Beam, pack: &Pack) -> u32 {
+        let [a, b, c] = [0, 1, 2].map(|vertex| sheared(&pack.vertices[vertex], &beam.shear));
+        let cross =
+            |p: (__m256, __m256), q: (__m256, __m256)| _mm256_sub_ps(_mm256_mul_ps(p.0, q.1), _mm256_mul_ps(p.1, q.0));
+        let [u, v, w] = [cross(c, b), cross(a, c), cross(b, a)];
+        let zero = _mm256_setzero_ps();
+        let negative = |e: __m256| _mm256_cmp_ps::<_CMP_LT_OQ>(e, zero);
+        let positive = |e: __m256| _mm256_cmp_ps::<_CMP_GT_OQ>(e, zero);
+        let any_negative = _mm256_or_ps(_mm256_or_ps(negative(u), negative(v)), negative(w));
+        let any_positive = _mm256_or_ps(_mm256_or_ps(positive(u), positive(v)), positive(w));
+        let occupied = _mm256_cmp_ps::<_CMP_ORD_Q>(u, u);
+        _mm256_movemask_ps(_mm256_andnot_ps(_mm256_and_ps(any_negative, any_positive), occupied)) as u32
     }
 }
 
@@ -362,18 +375,21 @@ fn walk<K: Kernel, const ANY: bool>(tree: &Tree, ray: &Ray) -> Option<Found> {
                 word = node.children[mask.trailing_zeros() as usize];
                 continue;
             }
-            let base = stack.len;
-            while mask != 0 {
-                let slot = mask.trailing_zeros() as usize & (WIDTH - 1);
-                mask &= mask - 1;
-                let child = node.children[slot];
-                if child.is_node() {
-                    K::prefetch(&tree.nodes, child.index());
-                } else {
-                    K::prefetch(&tree.packs, child.index());
+            if mask != 0 {
+                let mut nearest = take::<K>(tree, node, &near, &mut mask);
+                let base = stack.len;
+                while mask != 0 {
+                    let other = take::<K>(tree, node, &near, &mut mask);
+                    if ANY {
+                        stack.push(nearest);
+                        nearest = other;
+                    } else {
+                        stack.insert(base, nearest.max(other));
+                        nearest = nearest.min(other);
+                    }
                 }
-                let entry = u64::from(near[slot].to_bits()) << 32 | u64::from(child.0);
-                if ANY { stack.push(entry) } else { stack.insert(base, entry) }
+                word = Word(nearest as u32);
+                continue;
             }
         } else if word.is_primitive() {
             let (id, primitive) = &tree.primitives[word.index()];
@@ -414,6 +430,20 @@ fn walk<K: Kernel, const ANY: bool>(tree: &Tree, ray: &Ray) -> Option<Found> {
             }
         }
     }
+}
+
+/// The next child of a node in `mask`, which must not be 0, as an entry of the stack. Asks for its memory.
+#[inline(always)]
+fn take<K: Kernel>(tree: &Tree, node: &Node, near: &[f32; WIDTH], mask: &mut u32) -> u64 {
+    let slot = mask.trailing_zeros() as usize & (WIDTH - 1);
+    *mask &= *mask - 1;
+    let child = node.children[slot];
+    if child.is_node() {
+        K::prefetch(&tree.nodes, child.index());
+    } else {
+        K::prefetch(&tree.packs, child.index());
+    }
+    u64::from(near[slot].to_bits()) << 32 | u64::from(child.0)
 }
 
 struct Best {

@@ -82,7 +82,7 @@ impl Shear {
         let sign = if any_positive { 1.0 } else { -1.0 };
         let mut weights = edge_functions(sheared).map(|e| (e * sign).max(0.0));
         let mut sum = weights[0] + weights[1] + weights[2];
-        if !(sum > 0.0) {
+        if sum.is_nan() || sum <= 0.0 {
             // Seen edge-on up to the precision of f64, but not once rounded: the ray must not slip through here.
             weights = edges.map(f64::abs);
             sum = weights[0] + weights[1] + weights[2];

@@ -1,9 +1,9 @@
 //! Does a tree keep its promises?
 
-use super::Aabb;
 use super::builders::MAX_DEPTH;
 use super::traverse::Tree;
 use super::wide::{WIDTH, Word};
+use crate::math::Aabb;
 use std::collections::HashSet;
 
 /// Walks the whole tree; see [`Accel::validate`](super::Accel::validate).
@@ -62,7 +62,7 @@ impl Seen {
             return Err(format!("{word:?} has no triangles"));
         }
         for lane in occupied {
-            let bounds = Aabb::of(&pack.triangle(lane));
+            let bounds = Aabb::of_points(pack.triangle(lane));
             self.leaf(pack.ids[lane], &tree.frame.enclose(&bounds), outer)?;
         }
         Ok(())

@@ -1,6 +1,6 @@
 //! The memory that a ray walks through: nodes with eight children, and packs of eight triangles.
 
-use super::Aabb;
+use crate::math::Aabb;
 use glam::Vec3;
 
 /// Children of a node, and triangles in a pack.

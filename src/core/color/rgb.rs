@@ -50,6 +50,12 @@ impl Rgb {
         0.212671 * self.r + 0.715160 * self.g + 0.072169 * self.b
     }
 
+    /// CIE 1931 XYZ of linear sRGB.
+    pub fn to_xyz(self) -> [f32; 3] {
+        let Rgb { r, g, b } = self;
+        [0.412453 * r + 0.357580 * g + 0.180423 * b, self.luminance(), 0.019334 * r + 0.119193 * g + 0.950227 * b]
+    }
+
     /// Largest channel.
     #[inline]
     pub fn max_component(self) -> f32 {

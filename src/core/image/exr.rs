@@ -1,6 +1,6 @@
 //! OpenEXR, through the `exr` crate.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::io::Cursor;
 use std::path::Path;
 
@@ -14,8 +14,10 @@ use ::exr::meta::MetaData;
 use ::exr::meta::attribute::{AttributeValue, LineOrder, SampleType, Text};
 use ::exr::meta::header::{Header, LayerAttributes};
 use half::f16;
+use rayon::prelude::*;
 
 use super::{Image, PixelData, ReadLimits, Samples};
+use crate::io::limits::{declared, shielded};
 use crate::io::{IoError, Result, output, read_bytes};
 
 pub use ::exr::compression::Compression;
@@ -97,18 +99,28 @@ fn to_exr(image: &Image, options: &ExrOptions) -> Result<ExrImage<Layer<AnyChann
         };
         list.push(AnyChannel::new(text(name)?, samples));
     }
-    let mut other = HashMap::new();
+    let mut attributes = LayerAttributes::default();
     for (name, value) in &options.attributes {
         let value = match value {
-            Attribute::Text(value) => AttributeValue::Text(Text::new_or_none(value).unwrap_or_else(|| "?".into())),
+            Attribute::Text(value) => {
+                let value = Text::new_or_none(value)
+                    .ok_or_else(|| IoError::new(format!("the attribute {name:?} has characters beyond Latin-1")))?;
+                // The crate keeps the standard names apart.
+                match name.as_str() {
+                    "software" => attributes.software_name = Some(value),
+                    "comments" => attributes.comments = Some(value),
+                    "owner" => attributes.owner = Some(value),
+                    _ => _ = attributes.other.insert(text(name)?, AttributeValue::Text(value)),
+                }
+                continue;
+            }
             Attribute::Number(value) => AttributeValue::F64(*value),
             Attribute::Integer(value) => {
                 i32::try_from(*value).map_or(AttributeValue::F64(*value as f64), AttributeValue::I32)
             }
         };
-        other.insert(text(name)?, value);
+        attributes.other.insert(text(name)?, value);
     }
-    let attributes = LayerAttributes { other, ..LayerAttributes::default() };
     let encoding =
         Encoding { compression: options.compression, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
     let size = (image.width as usize, image.height as usize);
@@ -138,6 +150,10 @@ pub fn read(path: &Path, limits: &ReadLimits) -> Result<ExrFile> {
 /// # Errors
 /// As [`read`].
 pub fn read_from_bytes(bytes: &[u8], limits: &ReadLimits) -> Result<ExrFile> {
+    shielded("the EXR file", || read_all(bytes, limits))
+}
+
+fn read_all(bytes: &[u8], limits: &ReadLimits) -> Result<ExrFile> {
     let reader = open(bytes)?;
     let headers = reader.headers();
     let size = headers[0].layer_size;
@@ -164,6 +180,10 @@ pub fn read_from_bytes(bytes: &[u8], limits: &ReadLimits) -> Result<ExrFile> {
             Some((name.to_string(), value))
         })
         .collect();
+    let own = &headers[0].own_attributes;
+    for (name, value) in [("software", &own.software_name), ("comments", &own.comments), ("owner", &own.owner)] {
+        attributes.extend(value.as_ref().map(|value| (name.to_owned(), Attribute::Text(value.to_string()))));
+    }
     attributes.sort_by(|a, b| a.0.cmp(&b.0));
     let data = load(reader, &wanted, bytes.len(), limits, |value| value, f16::to_f32)?;
     Ok(ExrFile { image: Image { width: size.0 as u32, height: size.1 as u32, channels, data }, attributes })
@@ -207,6 +227,10 @@ fn choose(headers: &[Header]) -> Choice {
 
 /// Reads the colour channels of a file, see [`super::read`].
 pub(super) fn read_color(bytes: &[u8], limits: &ReadLimits) -> Result<PixelData> {
+    shielded("the EXR file", || read_chosen(bytes, limits))
+}
+
+fn read_chosen(bytes: &[u8], limits: &ReadLimits) -> Result<PixelData> {
     let reader = open(bytes)?;
     let Choice { part, color, alpha, xyz } = choose(reader.headers());
     let header = &reader.headers()[part];
@@ -232,7 +256,7 @@ pub(super) fn read_color(bytes: &[u8], limits: &ReadLimits) -> Result<PixelData>
 /// Linear sRGB of CIE XYZ, both relative to D65 (IEC 61966-2-1:1999).
 fn xyz_to_rgb([x, y, z]: [f32; 3]) -> [f32; 3] {
     [
-        3.240_479 * x - 1.537_150 * y - 0.498_535 * z,
+        3.240_479 * x - 1.537_15 * y - 0.498_535 * z,
         -0.969_256 * x + 1.875_991 * y + 0.041_556 * z,
         0.055_648 * x - 0.204_043 * y + 1.057_311 * z,
     ]
@@ -248,6 +272,9 @@ pub(super) fn separate<T: Copy>(values: Vec<T>, channels: usize, has_alpha: bool
     (pixels.flat_map(|pixel| &pixel[..channels]).copied().collect(), Some(alpha))
 }
 
+/// More channels than any renderer writes; choosing among them takes quadratic time.
+const MOST_CHANNELS: usize = 4096;
+
 type BytesReader<'a> = Reader<Cursor<&'a [u8]>>;
 
 fn damaged(error: ::exr::error::Error) -> IoError {
@@ -260,8 +287,15 @@ fn open(bytes: &[u8]) -> Result<BytesReader<'_>> {
     if headers.is_empty() || headers.iter().any(|header| header.channels.list.is_empty()) {
         return Err(IoError::new("the EXR file has a part without channels"));
     }
+    if headers.iter().map(|header| header.channels.list.len()).sum::<usize>() > MOST_CHANNELS {
+        return Err(IoError::new(format!("the EXR file has more than {MOST_CHANNELS} channels")));
+    }
     Ok(reader)
 }
+
+/// Chunks that are decompressed in parallel before their samples are put in place, and their total size.
+const CHUNKS_AT_ONCE: usize = 64;
+const BYTES_AT_ONCE: usize = 64 << 20;
 
 /// Reads the `wanted` channels (part, channel), all of parts of the same size, interleaved in this order.
 fn load<T: Clone + Default>(
@@ -276,21 +310,28 @@ fn load<T: Clone + Default>(
     let Vec2(width, height) = headers[wanted[0].0].layer_size;
     let pixel_bytes = wanted.len() as u64 * size_of::<T>() as u64;
     let pixels = limits.check(width as u64, height as u64, pixel_bytes, file_size)?;
+    let mut largest_chunk = 1;
     let whole = |Vec2(x, y): Vec2<usize>| x == 1 && y == 1;
     for &(part, channel) in wanted {
         let header = &headers[part];
         if header.deep || !whole(header.channels.list[channel].sampling) {
             return Err(IoError::new("deep and subsampled EXR files are not supported"));
         }
-        // Every chunk takes at least its offset and its size.
-        crate::io::limits::declared(header.chunk_count as u64, 12, file_size, "chunks")?;
+        // Every chunk takes at least its offset and its size, and is decompressed with all its channels.
+        declared(header.chunk_count as u64, 12, file_size, "chunks")?;
+        let Vec2(chunk_width, chunk_height) = header.max_block_pixel_size();
+        let bytes = header.channels.bytes_per_pixel as u64;
+        limits.check(chunk_width as u64, chunk_height as u64, bytes, file_size)?;
+        largest_chunk = largest_chunk.max(header.max_block_byte_size());
     }
+    let slots: HashMap<(usize, usize), usize> = wanted.iter().copied().zip(0..).collect();
+    let parts: HashSet<usize> = wanted.iter().map(|&(part, _)| part).collect();
     let mut data = vec![T::default(); pixels * wanted.len()];
-    let insert = |meta: &MetaData, block: UncompressedBlock| -> ::exr::error::UnitResult {
+    let mut insert = |meta: &MetaData, block: UncompressedBlock| -> ::exr::error::UnitResult {
         let header = &meta.headers[block.index.layer];
         for LineRef { location, value } in block.lines(&header.channels) {
             let line = LineRef { location, value };
-            let Some(slot) = wanted.iter().position(|&w| w == (location.layer, location.channel)) else { continue };
+            let Some(&slot) = slots.get(&(location.layer, location.channel)) else { continue };
             let Vec2(x, y) = location.position;
             if y >= height || x.saturating_add(location.sample_count) > width {
                 return Err(::exr::error::Error::Invalid("block outside the picture".into()));
@@ -304,18 +345,26 @@ fn load<T: Clone + Default>(
         }
         Ok(())
     };
-    let chunks = reader
+    let mut chunks = reader
         .filter_chunks(false, |_, tile, block: BlockIndex| {
-            tile.level_index == Vec2(0, 0) && wanted.iter().any(|&(part, _)| part == block.layer)
+            tile.level_index == Vec2(0, 0) && parts.contains(&block.layer)
         })
         .map_err(damaged)?;
-    // Starting threads takes longer than a small picture.
-    if pixels < 1 << 18 {
-        chunks.decompress_sequential(false, insert).map_err(damaged)?;
-    } else {
-        chunks.decompress_parallel(false, insert).map_err(damaged)?;
+    // The crate's own parallel reading would abort the process if a damaged chunk made it panic in one of its threads.
+    let meta = chunks.meta_data().clone();
+    let at_once = (BYTES_AT_ONCE / largest_chunk).clamp(1, CHUNKS_AT_ONCE);
+    loop {
+        let batch = chunks.by_ref().take(at_once).collect::<::exr::error::Result<Vec<_>>>().map_err(damaged)?;
+        if batch.is_empty() {
+            return Ok(data);
+        }
+        let blocks: Vec<_> = batch
+            .into_par_iter()
+            .map(|chunk| UncompressedBlock::decompress_chunk(chunk, &meta, false))
+            .collect::<::exr::error::Result<_>>()
+            .map_err(damaged)?;
+        blocks.into_iter().try_for_each(|block| insert(&meta, block)).map_err(damaged)?;
     }
-    Ok(data)
 }
 
 fn fill<'a, S, T: 'a>(
@@ -331,6 +380,9 @@ fn fill<'a, S, T: 'a>(
 
 #[cfg(test)]
 mod tests {
+    use ::exr::meta::attribute::IntegerBounds;
+    use ::exr::meta::header::ImageAttributes;
+
     use super::*;
     use crate::io::damage::for_each_damaged;
     use crate::io::output::TestFolder;
@@ -408,6 +460,25 @@ mod tests {
         let xyz = color(&sample(1, 1, &["X", "Y", "Z"])).to_f32(false);
         let reference = [-1.329_426, 2.907_394, 2.819_495];
         xyz.iter().zip(reference).for_each(|(value, expected)| assert!((value - expected).abs() < 2e-5, "{xyz:?}"));
+    }
+
+    #[test]
+    fn displaced_tiled_and_many_part_files_load() {
+        let image = sample(70, 50, &["R", "G", "B"]);
+        let mut first = to_exr(&sample(70, 50, &["depth"]), &ExrOptions::default()).unwrap().layer_data;
+        let mut second = to_exr(&image, &ExrOptions::default()).unwrap().layer_data;
+        second.encoding.blocks = Blocks::Tiles(Vec2(32, 32));
+        (first.attributes.layer_name, second.attributes.layer_name) = (Some("one".into()), Some("two".into()));
+        (first.attributes.layer_position, second.attributes.layer_position) = (Vec2(-20, 7), Vec2(-20, 7));
+        let window = IntegerBounds::from_dimensions((100, 100));
+        let mut bytes = Cursor::new(Vec::new());
+        let layers = ExrImage::from_layers(ImageAttributes::new(window), vec![first, second]);
+        layers.write().to_buffered(&mut bytes).unwrap();
+        let bytes = bytes.into_inner();
+        let picture = read_color(&bytes, &ReadLimits::default()).unwrap();
+        assert_eq!((picture.width, picture.height, picture.samples), (70, 50, Samples::F32(image.data)));
+        let file = read_from_bytes(&bytes, &ReadLimits::default()).unwrap();
+        assert_eq!(file.image.channels, ["one.depth", "two.B", "two.G", "two.R"]);
     }
 
     #[test]

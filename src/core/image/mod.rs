@@ -262,3 +262,42 @@ fn format_of(path: &Path) -> Result<Format> {
         _ => Err(IoError::new("cannot write this format; known are .exr, .png, .pfm, .hdr and .rgbe")),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::output::TestFolder;
+
+    #[test]
+    fn every_format_that_can_be_written_can_be_read() {
+        let folder = TestFolder::new("formats");
+        let mut image = Image::new(4, 3, &["R", "G", "B"]);
+        image.data.fill(1.0);
+        for name in ["a.exr", "a.PNG", "a.pfm", "a.hdr", "a.rgbe"] {
+            let path = folder.0.join(name);
+            check_writable(&path).unwrap();
+            write(&path, &image).unwrap();
+            let read = read(&path, &ReadLimits::default()).unwrap();
+            assert_eq!((read.width, read.height, read.channels), (4, 3, 3), "{name}");
+            assert!(read.to_f32(false).iter().all(|value| (value - 1.0).abs() < 0.01), "{name}");
+        }
+    }
+
+    #[test]
+    fn unwritable_results_and_unreadable_files_are_noticed() {
+        let folder = TestFolder::new("unwritable");
+        assert!(check_writable(&folder.0.join("a.jpg")).unwrap_err().message.contains("known are"));
+        assert!(check_writable(&folder.0.join("none/a.exr")).unwrap_err().message.contains("does not exist"));
+        assert!(read(&folder.0, &ReadLimits::default()).unwrap_err().message.contains("is a folder"));
+        assert!(read(&folder.0.join("a.png"), &ReadLimits::default()).unwrap_err().message.contains("cannot read"));
+    }
+
+    #[test]
+    fn grey_results_are_written_as_grey() {
+        let mut image = Image::new(1, 1, &["depth", "Y"]);
+        image.data.copy_from_slice(&[5.0, 0.25]);
+        assert_eq!(image.rgb().unwrap().collect::<Vec<_>>(), [[0.25; 3]]);
+        assert_eq!(image.pixel(0, 0), [5.0, 0.25]);
+        assert!(Image::new(0, 4, &["Y"]).rgb().is_err());
+    }
+}

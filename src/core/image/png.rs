@@ -21,3 +21,21 @@ pub fn write_srgb(path: &Path, image: &Image) -> Result<()> {
             .map_err(|error| IoError::from_library("cannot write the PNG file", error))
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::{ReadLimits, Samples, read};
+    use crate::io::output::TestFolder;
+
+    #[test]
+    fn values_are_encoded_and_clamped() {
+        let folder = TestFolder::new("png");
+        let path = folder.0.join("a.png");
+        let mut image = Image::new(2, 1, &["B", "G", "R", "A"]);
+        image.data.copy_from_slice(&[0.2158605, -1.0, 7.0, 0.0, f32::NAN, 1.0, f32::INFINITY, 0.0]);
+        write_srgb(&path, &image).unwrap();
+        let read = read(&path, &ReadLimits::default()).unwrap();
+        assert_eq!(read.samples, Samples::U8(vec![255, 0, 128, 255, 255, 0]));
+    }
+}

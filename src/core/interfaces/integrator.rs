@@ -17,6 +17,11 @@ pub trait Integrator: Send + Sync {
         Vec::new()
     }
 
+    /// Seconds after which the scene wants rendering to stop.
+    fn timeout(&self) -> Option<f64> {
+        None
+    }
+
     /// The integrator as a forward estimator, if it is one; only these can be nested.
     fn estimator(&self) -> Option<&dyn RadianceEstimator> {
         None
@@ -30,6 +35,8 @@ pub struct Radiance {
     pub rgb: Rgb,
     /// Alpha: 1 where the path met something that is not transparent, else 0.
     pub alpha: f32,
+    /// Rays traced to find it.
+    pub rays: u32,
 }
 
 /// A forward estimator without state between samples; the pass loop is shared

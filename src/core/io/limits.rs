@@ -51,6 +51,17 @@ pub fn deeper(depth: usize, limit: usize, what: &str) -> Result<usize> {
     if depth < limit { Ok(depth + 1) } else { Err(IoError::new(format!("{what} nested deeper than {limit} levels"))) }
 }
 
+/// Against panics in libraries, some of which subtract or index without looking when a file is damaged. The panic's own
+/// message still goes to standard error, for it deserves a report to the library; the caller gets an error.
+///
+/// # Errors
+/// If `read` fails or panics.
+pub fn shielded<T>(what: &str, read: impl FnOnce() -> Result<T>) -> Result<T> {
+    // Nothing that `read` leaves half done can be seen afterwards: readers only build what they return.
+    std::panic::catch_unwind(std::panic::AssertUnwindSafe(read))
+        .unwrap_or_else(|_| Err(IoError::new(format!("{what} is damaged and cannot be decoded"))))
+}
+
 /// A position in the bytes of a file.
 #[derive(Clone, Debug)]
 pub struct Cursor<'a> {
@@ -120,6 +131,13 @@ mod tests {
         assert!(product(&[1 << 32, 1 << 32], "voxels").is_err());
         assert_eq!(deeper(255, 256, "elements"), Ok(256));
         assert!(deeper(256, 256, "elements").is_err());
+    }
+
+    #[test]
+    fn a_panic_becomes_an_error() {
+        let shift = [1, 2].len();
+        assert!(shielded("the picture", || Ok([0; 2][shift])).unwrap_err().message.contains("the picture is damaged"));
+        assert_eq!(shielded("the picture", || Ok(7)), Ok(7));
     }
 
     #[test]

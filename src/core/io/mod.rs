@@ -11,6 +11,7 @@ pub mod obj;
 pub mod output;
 pub mod ply;
 pub mod serialized;
+pub mod vol;
 
 use std::path::Path;
 

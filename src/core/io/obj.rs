@@ -20,6 +20,8 @@ use super::{IoError, Result, TriangleMesh};
 /// Stands for "no texture coordinate" and "no normal" in a corner.
 const ABSENT: u32 = u32::MAX;
 
+const NOT_A_CORNER: &str = "a face corner is not v, v/vt, v//vn or v/vt/vn";
+
 /// Reads a mesh from the bytes of an OBJ file. Texture coordinates are returned as stored, without flipping v.
 ///
 /// # Errors
@@ -28,44 +30,32 @@ const ABSENT: u32 = u32::MAX;
 pub fn read(bytes: &[u8]) -> Result<TriangleMesh> {
     let mut reader = Reader::default();
     let mut rest = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
-    let mut line_number = 1;
     while !rest.is_empty() {
-        let (line, lines) = split_line(&mut rest);
-        reader.line(line).map_err(|wrong| IoError::new(format!("line {line_number}: {wrong}")))?;
-        line_number += lines;
+        let start = bytes.len() - rest.len();
+        reader.line(&mut rest).map_err(|wrong| {
+            let line = 1 + bytes[..start].iter().filter(|&&byte| byte == b'\n').count();
+            IoError::new(format!("line {line}: {wrong}"))
+        })?;
+        // What is left of the line is a comment, or nothing that is read here.
+        let end = rest.iter().position(|&byte| byte == b'\n');
+        rest = end.map_or(&[], |end| &rest[end + 1..]);
     }
     reader.finish()
 }
 
-/// Cuts one line off the front, with all lines it continues on; returns it and how many lines of the file it took.
-fn split_line<'a>(rest: &mut &'a [u8]) -> (&'a [u8], usize) {
-    let (mut end, mut lines) = (0, 1);
-    loop {
-        match rest[end..].iter().position(|&byte| byte == b'\n') {
-            None => {
-                let line = std::mem::take(rest);
-                return (line, lines);
-            }
-            Some(length) => {
-                end += length;
-                let line = &rest[..end];
-                end += 1;
-                if !line.strip_suffix(b"\r").unwrap_or(line).ends_with(b"\\") {
-                    *rest = &rest[end..];
-                    return (line, lines);
-                }
-                lines += 1;
-            }
-        }
+/// Passes over white space within a line, which goes on behind a backslash at its end.
+fn trim(rest: &mut &[u8]) {
+    while let [b' ' | b'\t' | b'\r' | 0x0B | 0x0C, tail @ ..]
+    | [b'\\', b'\n', tail @ ..]
+    | [b'\\', b'\r', b'\n', tail @ ..] = rest
+    {
+        *rest = tail;
     }
 }
 
-/// Drops white space, and the backslashes of continued lines.
-fn trim(mut line: &[u8]) -> &[u8] {
-    while let [b' ' | b'\t' | b'\r' | b'\n' | 0x0B | 0x0C | b'\\', tail @ ..] = line {
-        line = tail;
-    }
-    line
+/// Whether a word ends here.
+fn at_end_of_word(rest: &[u8]) -> bool {
+    matches!(rest.first(), None | Some(b' ' | b'\t' | b'\r' | b'\n' | 0x0B | 0x0C | b'\\'))
 }
 
 #[derive(Default)]
@@ -79,39 +69,48 @@ struct Reader {
 }
 
 impl Reader {
-    fn line(&mut self, line: &[u8]) -> std::result::Result<(), String> {
-        let line = trim(line);
-        match line {
+    /// Reads the statement at the front of `rest`, as far as it matters.
+    fn line(&mut self, rest: &mut &[u8]) -> std::result::Result<(), String> {
+        trim(rest);
+        match rest {
             [b'v', b' ' | b'\t', tail @ ..] => {
-                let position = Vec3::from(numbers(tail)?);
+                *rest = tail;
+                let position = Vec3::from(numbers(rest)?);
                 if !position.is_finite() {
                     return Err(format!("vertex {} is not finite", self.positions.len() + 1));
                 }
                 self.positions.push(position);
             }
             [b'v', b't', b' ' | b'\t', tail @ ..] => {
-                let uv = Vec2::from(numbers(tail)?);
+                *rest = tail;
+                let uv = Vec2::from(numbers(rest)?);
                 if !uv.is_finite() {
                     return Err(format!("texture coordinate {} is not finite", self.uvs.len() + 1));
                 }
                 self.uvs.push(uv);
             }
             // A normal that is not finite is treated as missing when the mesh is finished.
-            [b'v', b'n', b' ' | b'\t', tail @ ..] => self.normals.push(Vec3::from(numbers(tail)?)),
-            [b'f', b' ' | b'\t', tail @ ..] => self.face(tail)?,
+            [b'v', b'n', b' ' | b'\t', tail @ ..] => {
+                *rest = tail;
+                self.normals.push(Vec3::from(numbers(rest)?));
+            }
+            [b'f', b' ' | b'\t', tail @ ..] => {
+                *rest = tail;
+                self.face(rest)?;
+            }
             _ => {}
         }
         Ok(())
     }
 
-    fn face(&mut self, mut tail: &[u8]) -> std::result::Result<(), String> {
+    fn face(&mut self, rest: &mut &[u8]) -> std::result::Result<(), String> {
         self.face.clear();
         loop {
-            tail = trim(tail);
-            if tail.is_empty() || tail[0] == b'#' {
+            trim(rest);
+            if matches!(rest.first(), None | Some(b'\n' | b'#')) {
                 break;
             }
-            let corner = self.corner(&mut tail)?;
+            let corner = self.corner(rest)?;
             let vertex = self.shared.number_of(corner);
             self.face.push(vertex);
         }
@@ -143,10 +142,7 @@ impl Reader {
                 .filter(|&index| (index as usize) < count)
                 .ok_or_else(|| format!("{kind} {stored} does not exist ({count} so far)"))?;
         }
-        match tail.first() {
-            None | Some(b' ' | b'\t' | b'\r' | b'\n' | 0x0B | 0x0C | b'\\') => Ok(corner),
-            Some(_) => Err("a face corner is not v, v/vt, v//vn or v/vt/vn".into()),
-        }
+        if at_end_of_word(tail) { Ok(corner) } else { Err(NOT_A_CORNER.into()) }
     }
 
     fn finish(self) -> Result<TriangleMesh> {
@@ -178,17 +174,16 @@ impl Reader {
 }
 
 /// The first `N` numbers of a line; further ones (w, colours) are passed over.
-fn numbers<const N: usize>(mut tail: &[u8]) -> std::result::Result<[f32; N], String> {
+fn numbers<const N: usize>(rest: &mut &[u8]) -> std::result::Result<[f32; N], String> {
     let mut numbers = [0.0; N];
     for number in &mut numbers {
-        tail = trim(tail);
-        let (value, length) =
-            fast_float2::parse_partial::<f32, _>(tail).map_err(|_| format!("{N} numbers are expected"))?;
-        if !matches!(tail.get(length), None | Some(b' ' | b'\t' | b'\r' | b'\n' | 0x0B | 0x0C | b'\\')) {
-            return Err(format!("{N} numbers are expected"));
-        }
+        trim(rest);
+        let parsed = fast_float2::parse_partial::<f32, _>(*rest).ok();
+        let (value, length) = parsed
+            .filter(|&(_, length)| at_end_of_word(&rest[length..]))
+            .ok_or_else(|| format!("{N} numbers are expected"))?;
         *number = value;
-        tail = &tail[length..];
+        *rest = &rest[length..];
     }
     Ok(numbers)
 }
@@ -202,7 +197,7 @@ fn integer(tail: &mut &[u8]) -> std::result::Result<i64, String> {
     };
     let length = digits.iter().take_while(|byte| byte.is_ascii_digit()).count();
     if length == 0 {
-        return Err("a face corner is not v, v/vt, v//vn or v/vt/vn".into());
+        return Err(NOT_A_CORNER.into());
     }
     let value = digits[..length].iter().fold(0i64, |value, &digit| (value * 10 + i64::from(digit - b'0')).min(1 << 40));
     *tail = &digits[length..];
@@ -313,7 +308,14 @@ mod tests {
     #[test]
     fn relative_indices_continued_lines_and_odd_white_space_load() {
         let expected = mesh(&with_corners("f 1 2 3\n")).triangles;
-        for face in ["f -5 -4 -3\n", "f 1 2 \\\n3\n", "f 1\\\r\n 2 3", " \tf\t1  2\t3 # note\r\n", "f +1 2 3"] {
+        for face in [
+            "f -5 -4 -3\n",
+            "f 1 2 \\\n3\n",
+            "f 1\\\r\n 2 3",
+            "# not continued \\\nf 1 2 3",
+            " \tf\t1  2\t3 # note\r\n",
+            "f +1 2 3",
+        ] {
             assert_eq!(mesh(&with_corners(face)).triangles, expected, "{face:?}");
         }
         assert_eq!(mesh(&format!("\u{FEFF}{}f 1 2 3\n", CORNERS.replace('\n', "\r\n"))).triangles, expected);

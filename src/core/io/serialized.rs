@@ -5,9 +5,9 @@
 //! and colours as floats of the flagged width; 32-bit indices. The file ends with the offset of every shape (64 bits
 //! in version 4, 32 in version 3) and their 32-bit number. All little endian.
 
-use std::io::Read;
+use std::io::{BufReader, Read};
 
-use flate2::read::ZlibDecoder;
+use flate2::bufread::ZlibDecoder;
 use glam::{Vec2, Vec3};
 
 use super::limits::{Cursor, declared, index, product};
@@ -47,7 +47,7 @@ pub fn read(bytes: &[u8], shape_index: usize) -> Result<SerializedMesh> {
     let mut cursor = Cursor::new(&bytes[start..end]);
     let version = magic(&mut cursor)?;
     let compressed = cursor.rest();
-    let mut stream = Inflated { stream: ZlibDecoder::new(compressed), position: 0 };
+    let mut stream = Inflated { stream: BufReader::new(ZlibDecoder::new(compressed)), position: 0 };
     shape(&mut stream, version, compressed.len() as u64)
         .map_err(|error| IoError::new(format!("shape {shape_index} at byte {start}: {error}")))
 }
@@ -89,7 +89,8 @@ fn shape_range(bytes: &[u8], shape_index: usize, version: u16) -> Result<(usize,
 
 /// The inflated bytes of a shape.
 struct Inflated<'a> {
-    stream: ZlibDecoder<&'a [u8]>,
+    /// Buffered, because names and indices are read in small pieces.
+    stream: BufReader<ZlibDecoder<&'a [u8]>>,
     position: u64,
 }
 

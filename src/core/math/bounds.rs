@@ -43,6 +43,16 @@ impl Aabb {
         !self.min.cmple(self.max).all()
     }
 
+    /// Whether both corners are finite.
+    pub fn is_finite(&self) -> bool {
+        self.min.is_finite() && self.max.is_finite()
+    }
+
+    /// Whether every point of `other` is inside.
+    pub fn contains(&self, other: &Aabb) -> bool {
+        other.is_empty() || (self.min.cmple(other.min).all() && self.max.cmpge(other.max).all())
+    }
+
     /// Middle of the box.
     #[inline]
     pub fn center(&self) -> Vec3 {
@@ -56,7 +66,7 @@ impl Aabb {
         self.max - self.min
     }
 
-    /// Half of the surface area, the measure the surface-area heuristic needs; 0 if empty.
+    /// Half of the surface area, the measure the surface-area heuristic needs; infinite if it overflows, 0 if empty.
     #[inline]
     pub fn half_area(&self) -> f32 {
         let e = self.extent().max(Vec3::ZERO);

@@ -1,9 +1,124 @@
-//! Passes, tiles, budget, progress (types only).
-use std::marker::PhantomData;
-/// Context.
-pub struct RenderContext<'a>(PhantomData<&'a ()>);
-/// Report.
-pub struct Report;
-/// Error.
-#[derive(Debug)]
+//! The render driver: passes over tiles, budget, progress, and what is kept of the samples.
+//!
+//! A pass is a pure function of (scene, seed, sample range). Passes follow a fixed schedule ([`Schedule`]), tiles are
+//! fixed, and tile results are added to the film in tile order: the picture has the same bits for any number of
+//! threads, and a run that stops early has the bits of a run that was asked for that many samples.
+
+mod bad_samples;
+mod control;
+mod film_store;
+mod reference_order;
+mod tiles;
+
+pub use bad_samples::{BadSample, BadSamples};
+pub use control::{Budget, Control, Progress, Schedule};
+pub use film_store::FilmStore;
+pub use reference_order::ReferenceOrder;
+pub use tiles::{render_estimator, replay};
+
+use crate::interfaces::{FilmSettings, Sampler, Sensor};
+use crate::math::UVec2;
+use crate::scene::{BuiltSensor, Scene};
+use std::fmt;
+
+/// In which order random numbers are spent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum SampleOrder {
+    /// Each pixel sample has its own numbers.
+    #[default]
+    PerSample,
+    /// As the reference renderer's `scalar_rgb` with the sampler `independent`, for comparisons without noise.
+    Reference {
+        /// Threads the reference counts: its workers plus one.
+        threads: u32,
+    },
+}
+
+/// Everything an integrator needs to render.
+pub struct RenderContext<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// The camera.
+    pub sensor: &'a dyn Sensor,
+    /// Size, window, filter.
+    pub film: FilmSettings,
+    /// Where random numbers come from.
+    pub sampler: &'a dyn Sampler,
+    /// How long to render.
+    pub budget: Budget,
+    /// Chooses the random numbers.
+    pub seed: u32,
+    /// In which order they are spent.
+    pub order: SampleOrder,
+    /// Stop button, deadline and progress.
+    pub control: &'a Control<'a>,
+    /// Where the samples go.
+    pub store: FilmStore,
+}
+
+impl<'a> RenderContext<'a> {
+    /// A context with an empty film. `aovs` are the names of the channels after colour and alpha.
+    pub fn new(
+        scene: &'a Scene,
+        camera: &'a BuiltSensor,
+        budget: Budget,
+        seed: u32,
+        control: &'a Control<'a>,
+        aovs: Vec<String>,
+    ) -> Self {
+        let film = camera.film.settings().clone();
+        let store = FilmStore::new(film.crop_size, aovs);
+        let seed = seed.wrapping_add(camera.sampler.seed());
+        let (sensor, sampler) = (&*camera.sensor, &*camera.sampler);
+        RenderContext { scene, sensor, film, sampler, budget, seed, order: SampleOrder::PerSample, control, store }
+    }
+
+    /// Renders a part of the film only.
+    pub fn crop(&mut self, offset: UVec2, size: UVec2) {
+        (self.film.crop_offset, self.film.crop_size) = (offset, size);
+        self.store = FilmStore::new(size, self.store.aovs().to_vec());
+    }
+
+    /// The window that is sampled: the crop window, and a border if the film asks for one.
+    pub(crate) fn border(&self) -> u32 {
+        if self.film.sample_border { (self.film.filter.radius() - 0.5).ceil().max(0.0) as u32 } else { 0 }
+    }
+}
+
+/// How a render ended.
+#[derive(Clone, Debug, Default)]
+pub struct Report {
+    /// Samples per pixel of the passes that are complete.
+    pub spp: u32,
+    /// Pixel samples taken, those of an incomplete last pass included.
+    pub samples: u64,
+    /// Rays traced.
+    pub rays: u64,
+    /// Wall-clock seconds.
+    pub seconds: f64,
+    /// Samples that were dropped.
+    pub bad: BadSamples,
+    /// The user or the clock stopped it before the asked number of samples.
+    pub stopped: bool,
+}
+
+/// Why nothing could be rendered.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RenderError(pub String);
+
+impl fmt::Display for RenderError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for RenderError {}
+
+/// A rectangle of pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Window {
+    /// First pixel.
+    pub min: glam::IVec2,
+    /// Size in pixels.
+    pub size: UVec2,
+}

@@ -1,6 +1,6 @@
 //! Maps from the unit square to the domains light transport needs, and their densities.
 
-use crate::math::{Vec2, Vec3, safe_sqrt};
+use crate::math::{Vec2, Vec3, lerp, safe_sqrt, sqr};
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, FRAC_PI_4, PI, TAU};
 
 /// The unit square to the unit disk, area preserving up to a constant and continuous
@@ -70,6 +70,30 @@ pub fn square_to_cone(u: Vec2, cos_cutoff: f32) -> Vec3 {
     let z = cos_cutoff + (1.0 - cos_cutoff) * (1.0 - pn);
     let p = p * safe_sqrt((1.0 - cos_cutoff) * (2.0 - pn * (1.0 - cos_cutoff)));
     p.extend(z)
+}
+
+/// [0, 1] to [−1, 1] with density `1 − |x|`.
+#[inline]
+pub fn interval_to_tent(u: f32) -> f32 {
+    let u = u - 0.5;
+    (1.0 - safe_sqrt(1.0 - 2.0 * u.abs())).copysign(u)
+}
+
+/// [0, 1] to [0, 1] with a density in proportion to the line from `v0` at 0 to `v1` at 1.
+#[inline]
+pub fn interval_to_linear(v0: f32, v1: f32, u: f32) -> f32 {
+    // Where the line is nearly level, the quotient is a difference of nearly equal numbers.
+    if (v0 - v1).abs() > 1e-4 * (v0 + v1) { (v0 - safe_sqrt(lerp(sqr(v0), sqr(v1), u))) / (v0 - v1) } else { u }
+}
+
+/// The unit square to itself with a density in proportion to the bilinear interpolation of the values at its corners
+/// (0, 0), (1, 0), (0, 1), (1, 1); and the interpolated value at the point.
+#[inline]
+pub fn square_to_bilinear([v00, v10, v01, v11]: [f32; 4], u: Vec2) -> (Vec2, f32) {
+    let y = interval_to_linear(v00 + v10, v01 + v11, u.y);
+    let (left, right) = (lerp(v00, v01, y), lerp(v10, v11, y));
+    let x = interval_to_linear(left, right, u.x);
+    (Vec2::new(x, y), lerp(left, right, x))
 }
 
 /// The angle of a direction about +z, in [0, 2π).

@@ -6,7 +6,8 @@
 
 use super::error::Location;
 use glam::DMat4;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// What an object is for: the XML tag of an object, and the registry table its `type` is looked up in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -227,9 +228,28 @@ pub struct Description {
     pub notes: Vec<String>,
     /// What the user should see in any case, one line each.
     pub warnings: Vec<String>,
+    /// Files outside this folder are refused, however they are named.
+    pub confined_to: Option<PathBuf>,
+    /// The `version` of each included file where it differs from that of the main file, by the file's name as in
+    /// [`Location`].
+    pub file_versions: Vec<(Arc<str>, [u32; 3])>,
 }
 
 impl Description {
+    /// A description of one object alone.
+    pub fn of(node: Node) -> Self {
+        Description {
+            nodes: vec![node],
+            root: NodeId(0),
+            version: [3, 0, 0],
+            search_path: Vec::new(),
+            notes: Vec::new(),
+            warnings: Vec::new(),
+            confined_to: None,
+            file_versions: Vec::new(),
+        }
+    }
+
     /// A node.
     pub fn node(&self, id: NodeId) -> &Node {
         &self.nodes[id.0 as usize]
@@ -254,12 +274,53 @@ impl Description {
         })
     }
 
+    /// The version of the file that `at` lies in.
+    pub fn version_at(&self, at: &Location) -> [u32; 3] {
+        let other = self.file_versions.iter().find(|(file, _)| *file == at.file);
+        other.map_or(self.version, |(_, version)| *version)
+    }
+
     /// Finds an existing file: absolute names as they are, relative ones along the search path.
     pub fn find_file(&self, name: &str) -> Option<PathBuf> {
-        let path = PathBuf::from(name);
-        if path.is_absolute() {
-            return path.exists().then_some(path);
-        }
-        self.search_path.iter().map(|folder| folder.join(&path)).find(|p| p.exists())
+        self.locate(name).ok()
     }
+
+    /// Finds an existing file as [`find_file`](Self::find_file) does, or says why there is none to be had: a hint
+    /// for an error message.
+    pub fn locate(&self, name: &str) -> Result<PathBuf, String> {
+        let path = Path::new(name);
+        let found = if path.is_absolute() {
+            path.exists().then(|| path.to_owned())
+        } else {
+            self.search_path.iter().map(|folder| folder.join(path)).find(|p| p.exists())
+        };
+        match found {
+            Some(found) => self.check_confinement(&found).map(|()| found),
+            None if path.is_absolute() => Err("no such file".to_owned()),
+            None => {
+                let folders: Vec<_> =
+                    self.search_path.iter().map(|folder| format!("\"{}\"", folder.display())).collect();
+                Err(format!("no such file in {}", folders.join(", ")))
+            }
+        }
+    }
+
+    /// Refuses a path that leads out of [`confined_to`](Self::confined_to), links followed.
+    pub fn check_confinement(&self, path: &Path) -> Result<(), String> {
+        let Some(root) = &self.confined_to else { return Ok(()) };
+        let real = |path: &Path| path.canonicalize().map_err(|error| plain_io_error(&error));
+        if real(path)?.starts_with(real(root)?) {
+            Ok(())
+        } else {
+            Err(format!("files outside of \"{}\" are refused", root.display()))
+        }
+    }
+}
+
+/// What an I/O error says, without the number of the operating system.
+pub(crate) fn plain_io_error(error: &std::io::Error) -> String {
+    let text = error.to_string();
+    let text = text.split(" (os error").next().unwrap_or(&text);
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_lowercase().chain(letters).collect())
 }

@@ -293,7 +293,7 @@ impl<'a> Builder<'a> {
             node,
             plugin,
             children,
-            search_path: &self.description.search_path,
+            description: self.description,
             parent_shape,
             errors: RefCell::default(),
             warnings: RefCell::default(),

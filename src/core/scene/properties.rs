@@ -5,7 +5,7 @@
 //! constructor can find out (a damaged file, two parameters that exclude each other) it tells with
 //! [`Properties::error`].
 
-use super::description::{Node, ObjectKind, SpectrumValue, Value};
+use super::description::{Description, Node, ObjectKind, SpectrumValue, Value};
 use super::error::{Location, SceneError};
 use super::object::{BuiltShape, Object};
 use super::param::{Default, Param, ParamType, Slot};
@@ -24,7 +24,7 @@ pub struct Properties<'a> {
     pub(super) plugin: &'a Plugin,
     /// Built children: name of the slot, object.
     pub(super) children: Vec<(&'a str, Object)>,
-    pub(super) search_path: &'a [PathBuf],
+    pub(super) description: &'a Description,
     /// The shape an emitter sits on.
     pub(super) parent_shape: Option<Arc<dyn Shape>>,
     /// Errors the constructor has told.
@@ -162,18 +162,14 @@ impl<'a> Properties<'a> {
     /// An existing file.
     pub fn file(&self, name: &str) -> Result<PathBuf, Failed> {
         let text = self.string(name);
-        let path = PathBuf::from(text);
-        let found = if path.is_absolute() {
-            path.exists().then_some(path)
-        } else {
-            self.search_path.iter().map(|folder| folder.join(&path)).find(|p| p.exists())
-        };
-        match found {
-            Some(path) if path.is_dir() => Err(self.error(name, format!("\"{text}\" is a folder, not a file"))),
-            Some(path) => Ok(path),
-            None => {
+        match self.description.locate(text) {
+            Ok(path) if path.is_dir() => Err(self.error(name, format!("\"{text}\" is a folder, not a file"))),
+            Ok(path) => Ok(path),
+            Err(why) => {
                 self.missing_file.set(true);
-                Err(self.error(name, format!("file \"{text}\" not found")))
+                let at = self.node.parameter(name).map_or(&self.node.at, |p| &p.at);
+                self.errors.borrow_mut().push(SceneError::at(at, format!("file \"{text}\" not found")).hint(why));
+                Err(Failed)
             }
         }
     }

@@ -12,7 +12,7 @@
 //! coincident primitives cost no more than others.
 
 use super::{BinaryNode, BinaryTree, Builder, MAX_DEPTH, block_len};
-use crate::accel::Aabb;
+use crate::math::Aabb;
 use glam::{Vec3, Vec3A};
 use rayon::prelude::*;
 
@@ -24,7 +24,6 @@ pub struct BinnedSah;
 const FORK: usize = 4096;
 /// Nodes larger than this are binned in pieces of this size by several threads.
 const PIECE: usize = 65_536;
-const MAX_BINS: usize = 32;
 
 #[derive(Clone, Copy)]
 struct Reference {
@@ -34,7 +33,7 @@ struct Reference {
 }
 
 impl Reference {
-    /// Twice the centroid, but finite for every finite box.
+    /// The middle of the box, finite for every finite box.
     fn centroid(&self) -> Vec3A {
         self.min * 0.5 + self.max * 0.5
     }
@@ -95,9 +94,16 @@ fn build_subtree(
     node.index = base as u32;
 
     let must_halve = count.next_power_of_two().ilog2() as usize >= MAX_DEPTH - depth;
-    let middle = match best_split(references, &centroids) {
-        Some(split) if !must_halve => partition(references, |r| split.is_left(r)),
-        _ => halve(references, &centroids),
+    let split = match count {
+        _ if must_halve => None,
+        0..=2 => None,
+        3..16 => best_split::<8>(references, &centroids),
+        16..256 => best_split::<16>(references, &centroids),
+        _ => best_split::<32>(references, &centroids),
+    };
+    let middle = match split {
+        Some(split) => partition(references, |r| split.is_left(r)),
+        None => halve(references, &centroids),
     };
 
     let (left_refs, right_refs) = references.split_at_mut(middle);
@@ -174,10 +180,10 @@ impl Split {
 }
 
 #[derive(Clone)]
-struct Bins([[(Extent, u32); MAX_BINS]; 3]);
+struct Bins<const N: usize>([[(Extent, u32); N]; 3]);
 
-impl Bins {
-    const EMPTY: Self = Self([[(Extent::EMPTY, 0); MAX_BINS]; 3]);
+impl<const N: usize> Bins<N> {
+    const EMPTY: Self = Self([[(Extent::EMPTY, 0); N]; 3]);
 
     fn fill(mut self, binning: &Binning, references: &[Reference]) -> Self {
         for r in references {
@@ -202,21 +208,15 @@ impl Bins {
 }
 
 /// The border with the least Σ area · primitives; `None` when no border has primitives on both sides and a finite cost.
-fn best_split(references: &[Reference], centroids: &Extent) -> Option<Split> {
-    let bins = match references.len() {
-        0..16 => 8,
-        16..256 => 16,
-        _ => MAX_BINS,
-    };
-    let binning = Binning::new(centroids, bins);
+fn best_split<const N: usize>(references: &[Reference], centroids: &Extent) -> Option<Split> {
+    let binning = Binning::new(centroids, N);
     let table = if references.len() <= PIECE {
-        Bins::EMPTY.fill(&binning, references)
+        Bins::<N>::EMPTY.fill(&binning, references)
     } else {
-        let mut pieces =
-            references.par_chunks(PIECE).map(|p| Box::new(Bins::EMPTY.fill(&binning, p))).collect::<Vec<_>>();
-        let mut total = pieces.swap_remove(0);
+        let pieces: Vec<_> = references.par_chunks(PIECE).map(|piece| Bins::<N>::EMPTY.fill(&binning, piece)).collect();
+        let mut total = Bins::EMPTY;
         pieces.iter().for_each(|piece| total.merge(piece));
-        *total
+        total
     };
 
     let mut best = None;
@@ -225,15 +225,15 @@ fn best_split(references: &[Reference], centroids: &Extent) -> Option<Split> {
         if binning.scale[axis] == 0.0 {
             continue;
         }
-        let mut right_cost = [0.0; MAX_BINS];
+        let mut right_cost = [0.0; N];
         let (mut extent, mut count) = (Extent::EMPTY, 0);
-        for border in (1..bins).rev() {
+        for border in (1..N).rev() {
             extent.grow(&row[border].0);
             count += row[border].1;
             right_cost[border] = if count == 0 { f32::INFINITY } else { extent.half_area() * count as f32 };
         }
         (extent, count) = (Extent::EMPTY, 0);
-        for border in 1..bins {
+        for border in 1..N {
             extent.grow(&row[border - 1].0);
             count += row[border - 1].1;
             let cost = extent.half_area() * count as f32 + right_cost[border];

@@ -10,7 +10,7 @@ mod ploc;
 pub use binned_sah::BinnedSah;
 pub use ploc::Ploc;
 
-use super::Aabb;
+use crate::math::Aabb;
 
 /// No builder returns a deeper tree (the root alone has depth 0), so traversal needs a small fixed stack.
 pub const MAX_DEPTH: usize = 64;

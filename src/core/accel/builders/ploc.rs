@@ -8,7 +8,7 @@
 //! number of primitives, and the tree becomes a list. Such input, and what overflows, goes to [`BinnedSah`] instead.
 
 use super::{BinaryNode, BinaryTree, BinnedSah, Builder, MAX_DEPTH, block_len};
-use crate::accel::Aabb;
+use crate::math::Aabb;
 use obvhs::bvh2::{Bvh2, reinsertion::ReinsertionOptimizer};
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision, morton::morton_encode_u64_unorm};
 
@@ -39,7 +39,7 @@ impl Builder for Ploc {
 fn longest_tie(bounds: &[Aabb]) -> usize {
     let total = bounds.iter().fold(Aabb::EMPTY, |all, b| all.union(*b));
     let extent = total.max - total.min;
-    if !(extent.max_element() < MAX_EXTENT) {
+    if extent.max_element() > MAX_EXTENT {
         return usize::MAX;
     }
     let scale = extent.as_dvec3().map(|e| if e > 0.0 { 1.0 / e } else { 0.0 });

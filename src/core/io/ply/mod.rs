@@ -7,9 +7,9 @@
 //! `foo_0 foo_1 …` are `vertex_foo` (`face_…` in faces). In addition, a single property whose own name starts with
 //! `vertex_` or `face_` is an attribute of one channel. Values are kept as stored: bytes are not divided by 255.
 //!
-//! The header is read by the crate `ply-rs-bw`. Rows of any layout go through [`rows`], because the crate refuses
+//! The header is read by the crate `ply-rs-bw`. Rows of any layout go through `rows`, because the crate refuses
 //! numbers such as `.5` and `nan` in text and needs some hundred bytes of memory per row; binary files with the usual
-//! layout take the fixed-stride way of [`fast`], which is ten times as fast. The tests compare both with the crate.
+//! layout take the fixed-stride way of `fast`. The tests compare both with the crate.
 
 mod attributes;
 mod fast;

@@ -1,0 +1,183 @@
+//! `aov`: properties of the visible surface as extra channels.
+//!
+//! | parameter | type | default | meaning |
+//! |---|---|---|---|
+//! | `aovs` | string | required | list of `name:type`, separated by commas or blanks |
+//! | nested integrators | | | any number; channels `<name>.R .G .B .A`, before all others |
+//!
+//! Types and channels: `albedo` (`.R .G .B`), `depth` (`.T`, as the integrator `depth`), `position`, `geo_normal`,
+//! `sh_normal`, `dp_du`, `dp_dv` (`.X .Y .Z`), `uv`, `duv_dx`, `duv_dy` (`.U .V`, the latter two 0: no differentials
+//! are followed), `prim_index`, `shape_index` (`.I`; shapes count from 1 in file order, 0 is the background). All are 0
+//! where nothing is hit. Indices are filtered like colours: use a box filter. The picture's colour is that of the
+//! first nested integrator, black without one.
+//!
+//! ```xml
+//! <integrator type="aov">
+//!     <string name="aovs" value="dd:depth,nn:sh_normal"/>
+//!     <integrator type="path" name="image"/>
+//! </integrator>
+//! ```
+
+use super::common::COMMON;
+use lucerna_core::accel::Ray;
+use lucerna_core::interfaces::{Arena, Integrator, Radiance, RadianceEstimator, SurfaceHit};
+use lucerna_core::render::{RenderContext, RenderError, Report, render_estimator};
+use lucerna_core::sampling::Stream;
+use lucerna_core::scene::{Built, Constructor, ObjectKind, Param, Plugin, Properties, Scene, did_you_mean};
+use std::sync::Arc;
+
+/// Table entry.
+pub const PLUGIN: Plugin = Plugin {
+    name: "aov",
+    aliases: &[],
+    summary: "properties of the visible surface as extra channels",
+    params: &[
+        COMMON,
+        &[
+            Param::string_opt("aovs", "list of name:type").required(),
+            Param::child(ObjectKind::Integrator, 0, usize::MAX, "integrators whose images come first"),
+        ],
+    ],
+    build: Constructor::Integrator(build),
+};
+
+/// One property of the visible surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Albedo,
+    Depth,
+    Position,
+    Uv,
+    GeoNormal,
+    ShNormal,
+    DpDu,
+    DpDv,
+    DuvDx,
+    DuvDy,
+    PrimIndex,
+    ShapeIndex,
+}
+
+/// Name in the scene file, what it is, and the suffixes of its channels.
+const KINDS: &[(&str, Kind, &[&str])] = &[
+    ("albedo", Kind::Albedo, &["R", "G", "B"]),
+    ("depth", Kind::Depth, &["T"]),
+    ("position", Kind::Position, &["X", "Y", "Z"]),
+    ("uv", Kind::Uv, &["U", "V"]),
+    ("geo_normal", Kind::GeoNormal, &["X", "Y", "Z"]),
+    ("sh_normal", Kind::ShNormal, &["X", "Y", "Z"]),
+    ("dp_du", Kind::DpDu, &["X", "Y", "Z"]),
+    ("dp_dv", Kind::DpDv, &["X", "Y", "Z"]),
+    ("duv_dx", Kind::DuvDx, &["U", "V"]),
+    ("duv_dy", Kind::DuvDy, &["U", "V"]),
+    ("prim_index", Kind::PrimIndex, &["I"]),
+    ("shape_index", Kind::ShapeIndex, &["I"]),
+];
+
+fn build(p: &Properties<'_>) -> Built<dyn Integrator> {
+    let mut nested = Vec::new();
+    let mut names = Vec::new();
+    for (name, integrator) in p.integrators() {
+        if integrator.estimator().is_none() {
+            return Err(p.error(name, format!("integrator \"{name}\" cannot be nested")));
+        }
+        names.extend(["R", "G", "B", "A"].map(|c| format!("{name}.{c}")));
+        let own = integrator.aov_names();
+        nested.push((integrator, own.len()));
+    }
+    for (name, integrator) in p.integrators() {
+        names.extend(integrator.aov_names().iter().map(|aov| format!("{name}.{aov}")));
+    }
+    let mut kinds = Vec::new();
+    for item in p.string("aovs").split([',', ' ', '\t', '\n']).filter(|s| !s.is_empty()) {
+        let Some((name, kind)) = item.split_once(':').filter(|(n, k)| !n.is_empty() && !k.is_empty()) else {
+            return Err(p.error("aovs", format!("\"{item}\" is not of the form name:type")));
+        };
+        let Some((_, kind, channels)) = KINDS.iter().find(|(text, ..)| *text == kind) else {
+            let all = KINDS.iter().map(|(text, ..)| *text);
+            let hint = did_you_mean(kind, all.clone()).map_or_else(
+                || format!("one of {}", all.collect::<Vec<_>>().join(", ")),
+                |meant| format!("did you mean \"{meant}\"?"),
+            );
+            return Err(p.error("aovs", format!("unknown type \"{kind}\" in \"{item}\" ({hint})")));
+        };
+        kinds.push(*kind);
+        names.extend(channels.iter().map(|c| format!("{name}.{c}")));
+    }
+    Ok(Arc::new(Aov { nested, kinds, names }))
+}
+
+struct Aov {
+    /// Integrators with the number of their own extra channels.
+    nested: Vec<(Arc<dyn Integrator>, usize)>,
+    kinds: Vec<Kind>,
+    names: Vec<String>,
+}
+
+impl Integrator for Aov {
+    fn render(&self, cx: &mut RenderContext<'_>) -> Result<Report, RenderError> {
+        render_estimator(cx, self)
+    }
+
+    fn aov_names(&self) -> Vec<String> {
+        self.names.clone()
+    }
+
+    fn estimator(&self) -> Option<&dyn RadianceEstimator> {
+        Some(self)
+    }
+}
+
+impl RadianceEstimator for Aov {
+    fn radiance(
+        &self,
+        scene: &Scene,
+        ray: &Ray,
+        stream: &mut Stream<'_>,
+        arena: &mut Arena,
+        aovs: &mut [f32],
+    ) -> Radiance {
+        let mut found = Radiance::default();
+        let (images, mut rest) = aovs.split_at_mut(4 * self.nested.len());
+        for (i, (integrator, own)) in self.nested.iter().enumerate() {
+            let (own, others) = rest.split_at_mut(*own);
+            rest = others;
+            let Some(estimator) = integrator.estimator() else { continue };
+            let inner = estimator.radiance(scene, ray, stream, arena, own);
+            images[4 * i..4 * i + 3].copy_from_slice(&inner.rgb.to_array());
+            images[4 * i + 3] = inner.alpha;
+            found.rays += inner.rays;
+            if i == 0 {
+                (found.rgb, found.alpha) = (inner.rgb, inner.alpha);
+            }
+        }
+        found.rays += 1;
+        let Some(hit) = scene.intersect_surface(ray) else { return found };
+        for kind in &self.kinds {
+            let (out, others) = rest.split_at_mut(channels(*kind));
+            write(*kind, scene, &hit, arena, out);
+            rest = others;
+        }
+        found
+    }
+}
+
+fn channels(kind: Kind) -> usize {
+    KINDS.iter().find(|(_, k, _)| *k == kind).map_or(0, |(.., suffixes)| suffixes.len())
+}
+
+fn write(kind: Kind, scene: &Scene, hit: &SurfaceHit, arena: &Arena, out: &mut [f32]) {
+    match kind {
+        Kind::Albedo => out.copy_from_slice(&scene.bsdf(hit).diffuse_reflectance(hit, arena).to_array()),
+        Kind::Depth => out[0] = hit.t,
+        Kind::Position => out.copy_from_slice(&hit.p.to_array()),
+        Kind::Uv => out.copy_from_slice(&hit.uv.to_array()),
+        Kind::GeoNormal => out.copy_from_slice(&hit.n.to_array()),
+        Kind::ShNormal => out.copy_from_slice(&hit.frame.n.to_array()),
+        Kind::DpDu => out.copy_from_slice(&hit.dp_du.to_array()),
+        Kind::DpDv => out.copy_from_slice(&hit.dp_dv.to_array()),
+        Kind::DuvDx | Kind::DuvDy => out.fill(0.0),
+        Kind::PrimIndex => out[0] = hit.prim as f32,
+        Kind::ShapeIndex => out[0] = (hit.shape + 1) as f32,
+    }
+}

@@ -1,0 +1,133 @@
+//! What integrators share: common parameters, multiple importance sampling, light that a ray runs into.
+
+use lucerna_core::accel::Ray;
+use lucerna_core::color::Rgb;
+use lucerna_core::interfaces::{EmitterFlags, LightPoint, SurfaceHit};
+use lucerna_core::math::Vec3;
+use lucerna_core::scene::{EmitterId, Param, Properties, Scene};
+
+/// Parameters of every integrator.
+pub const COMMON: &[Param] = &[
+    Param::float("timeout", -1.0, "seconds after which rendering stops; negative: never (see also --seconds)"),
+    Param::bool("hide_emitters", false, "lights are not seen directly"),
+    Param::ignored("block_size", "hint for the reference renderer"),
+    Param::ignored("samples_per_pass", "hint for the reference renderer"),
+];
+
+/// Parameters of integrators that follow paths.
+pub const PATH: &[Param] = &[
+    Param::int("max_depth", -1, "longest path: 1 sees lights only, 2 direct light, -1 no limit").at_least(-1.0),
+    Param::int("rr_depth", 5, "depth from which Russian roulette may end a path").at_least(1.0),
+];
+
+/// How long paths get.
+#[derive(Clone, Copy, Debug)]
+pub struct PathLimits {
+    /// Largest number of surface events plus one.
+    pub max_depth: u32,
+    /// Depth from which roulette is played.
+    pub rr_depth: u32,
+    /// Lights are invisible to the camera.
+    pub hide_emitters: bool,
+}
+
+impl PathLimits {
+    /// From [`COMMON`] and [`PATH`].
+    pub fn new(p: &Properties<'_>) -> Self {
+        let number = |name: &str| u32::try_from(p.int(name)).unwrap_or(u32::MAX);
+        PathLimits {
+            max_depth: number("max_depth"),
+            rr_depth: number("rr_depth"),
+            hide_emitters: p.bool("hide_emitters"),
+        }
+    }
+}
+
+/// Power heuristic with exponent 2 (Veach 1997, section 9.2): the weight of the strategy with density `a`.
+#[inline]
+pub fn mis_weight(a: f32, b: f32) -> f32 {
+    let (a, b) = (a * a, b * b);
+    let weight = a / (a + b);
+    if weight.is_finite() { weight } else { 0.0 }
+}
+
+/// Survival probability of Russian roulette: the throughput's largest channel, with the compression of radiance in
+/// optically dense media taken out, at most 0.95 so that total internal reflection ends too.
+#[inline]
+pub fn survival(throughput: Rgb, eta: f32) -> f32 {
+    (throughput.max_component() * eta * eta).min(0.95)
+}
+
+/// Where a path was last scattered into a density: what a light found by chance is weighted against.
+#[derive(Clone, Copy)]
+pub struct Scattered {
+    /// The point.
+    pub p: Vec3,
+    /// Density of the direction taken, per solid angle.
+    pub pdf: f32,
+}
+
+/// The emitter a ray has run into, and its radiance; `None` where nothing shines.
+#[inline]
+pub fn emission(scene: &Scene, ray: &Ray, hit: Option<&SurfaceHit>) -> Option<(EmitterId, Rgb)> {
+    let (id, radiance) = match hit {
+        Some(hit) => {
+            let id = scene.emitter_at(hit)?;
+            (id, scene.emitter(id).radiance(hit))
+        }
+        None => {
+            let id = scene.environment()?;
+            (id, scene.emitter(id).background(ray.d))
+        }
+    };
+    (!radiance.is_black()).then_some((id, radiance))
+}
+
+/// As [`emission`], weighted against emitter sampling if the path was scattered into a density before.
+#[inline]
+pub fn weighted_emission(scene: &Scene, ray: &Ray, hit: Option<&SurfaceHit>, last: Option<Scattered>) -> Rgb {
+    let Some((id, radiance)) = emission(scene, ray, hit) else { return Rgb::BLACK };
+    match last {
+        None => radiance,
+        Some(last) => {
+            let point = match hit {
+                Some(hit) => LightPoint::of_hit(last.p, hit, ray.d),
+                None => LightPoint::of_environment(ray.d),
+            };
+            radiance * mis_weight(last.pdf, scene.pdf_emitter(id, last.p, &point))
+        }
+    }
+}
+
+/// The first hit that gives off no light: what the camera sees where lights are hidden.
+pub fn first_hit_without_light(scene: &Scene, ray: &Ray, rays: &mut u32) -> Option<SurfaceHit> {
+    let mut ray = *ray;
+    loop {
+        *rays += 1;
+        let hit = scene.intersect_surface(&ray)?;
+        let shines = scene.emitter_at(&hit).is_some_and(|id| scene.emitter(id).flags().has(EmitterFlags::SURFACE));
+        if !shines {
+            return Some(hit);
+        }
+        ray = Ray { o: hit.origin_towards(ray.d), d: ray.d, t_min: 0.0, t_max: ray.t_max - hit.t };
+    }
+}
+
+/// Replaces the estimator-independent part of a plugin: an integrator that is a plain forward estimator.
+macro_rules! forward_integrator {
+    ($type:ty) => {
+        impl lucerna_core::interfaces::Integrator for $type {
+            fn render(
+                &self,
+                cx: &mut lucerna_core::render::RenderContext<'_>,
+            ) -> Result<lucerna_core::render::Report, lucerna_core::render::RenderError> {
+                lucerna_core::render::render_estimator(cx, self)
+            }
+
+            fn estimator(&self) -> Option<&dyn lucerna_core::interfaces::RadianceEstimator> {
+                Some(self)
+            }
+        }
+    };
+}
+pub(crate) use forward_integrator;

@@ -1,0 +1,132 @@
+//! `direct`: light that reaches the camera after at most one bounce.
+//!
+//! A number of emitter samples and a number of BSDF samples per pixel sample, combined by multiple importance sampling
+//! with these counts (Veach 1997, chapter 9).
+//!
+//! | parameter | type | default | meaning |
+//! |---|---|---|---|
+//! | `shading_samples` | integer | 1 | sets both counts; excludes them |
+//! | `emitter_samples` | integer | `shading_samples` | emitter samples per pixel sample |
+//! | `bsdf_samples` | integer | `shading_samples` | BSDF samples per pixel sample; not both 0 |
+//! | `hide_emitters` | boolean | false | lights are not seen directly |
+//!
+//! ```xml
+//! <integrator type="direct">
+//!     <integer name="emitter_samples" value="2"/>
+//!     <integer name="bsdf_samples" value="1"/>
+//! </integrator>
+//! ```
+
+use super::common::{COMMON, emission, first_hit_without_light, forward_integrator, mis_weight};
+use lucerna_core::accel::Ray;
+use lucerna_core::color::Rgb;
+use lucerna_core::interfaces::{Arena, Integrator, LightPoint, Lobes, Radiance, RadianceEstimator, Transport};
+use lucerna_core::sampling::Stream;
+use lucerna_core::scene::{Built, Constructor, Param, Plugin, Properties, Scene};
+use std::sync::Arc;
+
+/// Table entry.
+pub const PLUGIN: Plugin = Plugin {
+    name: "direct",
+    aliases: &[],
+    summary: "direct light only",
+    params: &[
+        COMMON,
+        &[
+            Param::int_opt("shading_samples", "sets both counts below").range(1.0, MOST),
+            Param::int_opt("emitter_samples", "emitter samples per pixel sample").range(0.0, MOST),
+            Param::int_opt("bsdf_samples", "BSDF samples per pixel sample").range(0.0, MOST),
+        ],
+    ],
+    build: Constructor::Integrator(build),
+};
+
+/// More samples than this per pixel sample are a mistake.
+const MOST: f64 = 65536.0;
+
+fn build(p: &Properties<'_>) -> Built<dyn Integrator> {
+    p.exclusive("shading_samples", "emitter_samples")?;
+    p.exclusive("shading_samples", "bsdf_samples")?;
+    let shading = p.int_opt("shading_samples").unwrap_or(1);
+    let count = |name: &str| p.int_opt(name).unwrap_or(shading) as u32;
+    let (emitter_samples, bsdf_samples) = (count("emitter_samples"), count("bsdf_samples"));
+    if emitter_samples + bsdf_samples == 0 {
+        return Err(p.error("bsdf_samples", "\"emitter_samples\" and \"bsdf_samples\" cannot both be 0"));
+    }
+    Ok(Arc::new(Direct { emitter_samples, bsdf_samples, hide_emitters: p.bool("hide_emitters") }))
+}
+
+struct Direct {
+    emitter_samples: u32,
+    bsdf_samples: u32,
+    hide_emitters: bool,
+}
+
+forward_integrator!(Direct);
+
+impl RadianceEstimator for Direct {
+    fn radiance(
+        &self,
+        scene: &Scene,
+        ray: &Ray,
+        stream: &mut Stream<'_>,
+        arena: &mut Arena,
+        _aovs: &mut [f32],
+    ) -> Radiance {
+        let mut found = Radiance::default();
+        let hit = if self.hide_emitters {
+            first_hit_without_light(scene, ray, &mut found.rays)
+        } else {
+            found.rays += 1;
+            scene.intersect_surface(ray)
+        };
+        if !self.hide_emitters
+            && let Some((_, radiance)) = emission(scene, ray, hit.as_ref())
+        {
+            found.rgb += radiance;
+        }
+        found.alpha = f32::from(hit.is_some() || (!self.hide_emitters && scene.environment().is_some()));
+        let Some(hit) = hit else { return found };
+        let (emitter_count, bsdf_count) = (self.emitter_samples as f32, self.bsdf_samples as f32);
+        let bsdf = scene.bsdf(&hit);
+        let bxdf = bsdf.resolve(&hit, arena);
+
+        if bsdf.lobes().is_smooth() {
+            for _ in 0..self.emitter_samples {
+                let Some((_, light)) = scene.sample_emitter(hit.p, stream.next_2d()) else { continue };
+                let (value, pdf) = bxdf.eval_pdf(hit.wi, hit.to_local(light.point.d), Transport::Radiance);
+                let contribution = value * light.weight;
+                if contribution.is_black() {
+                    continue;
+                }
+                found.rays += 1;
+                if scene.visible(&hit, &light) {
+                    let weight =
+                        if light.delta { 1.0 } else { mis_weight(light.pdf * emitter_count, pdf * bsdf_count) };
+                    found.rgb += contribution * (weight / emitter_count);
+                }
+            }
+        }
+
+        for _ in 0..self.bsdf_samples {
+            let (u1, u2) = (stream.next_1d(), stream.next_2d());
+            let Some(sample) = bxdf.sample(hit.wi, u1, u2, Transport::Radiance) else { continue };
+            let d = hit.to_world(sample.wo);
+            let next = Ray::new(hit.origin_towards(d), d);
+            found.rays += 1;
+            let light_hit = scene.intersect_surface(&next);
+            let Some((id, radiance)) = emission(scene, &next, light_hit.as_ref()) else { continue };
+            let weight = if sample.lobe.intersects(Lobes::DELTA) {
+                1.0
+            } else {
+                let point = match &light_hit {
+                    Some(light_hit) => LightPoint::of_hit(hit.p, light_hit, d),
+                    None => LightPoint::of_environment(d),
+                };
+                mis_weight(sample.pdf * bsdf_count, scene.pdf_emitter(id, hit.p, &point) * emitter_count)
+            };
+            found.rgb += Rgb::splat(weight / bsdf_count) * radiance * sample.weight;
+        }
+        found
+    }
+}

@@ -1,0 +1,149 @@
+//! `volpath`: path tracing that looks through index-matched surfaces.
+//!
+//! Where a scene holds no medium, the rules that differ from `path` are: a shadow ray passes surfaces that let light
+//! straight through (`null`, `mask`), attenuated; passing one is no event of the path and does not count as depth; and
+//! roulette starts one vertex later (`depth > rr_depth`). Participating media are not built yet: a scene with one is
+//! refused when it is loaded.
+//!
+//! | parameter | type | default | meaning |
+//! |---|---|---|---|
+//! | `max_depth` | integer | -1 | longest path: 0 black, 1 lights only, 2 direct light, -1 no limit |
+//! | `rr_depth` | integer | 5 | depth beyond which Russian roulette may end a path |
+//! | `hide_emitters` | boolean | false | lights are not seen directly |
+//!
+//! ```xml
+//! <integrator type="volpath">
+//!     <integer name="max_depth" value="16"/>
+//! </integrator>
+//! ```
+
+use super::common::{COMMON, PATH, PathLimits, Scattered, forward_integrator, mis_weight, survival, weighted_emission};
+use lucerna_core::accel::Ray;
+use lucerna_core::color::Rgb;
+use lucerna_core::interfaces::{
+    Arena, Integrator, LightSample, Lobes, Radiance, RadianceEstimator, SurfaceHit, Transport,
+};
+use lucerna_core::sampling::Stream;
+use lucerna_core::scene::{Built, Constructor, Plugin, Properties, Scene, shadow_ray};
+use std::sync::Arc;
+
+/// Table entry.
+pub const PLUGIN: Plugin = Plugin {
+    name: "volpath",
+    aliases: &[],
+    summary: "path tracing that looks through index-matched surfaces",
+    params: &[COMMON, PATH],
+    build: Constructor::Integrator(build),
+};
+
+fn build(p: &Properties<'_>) -> Built<dyn Integrator> {
+    Ok(Arc::new(VolPath::new(p)))
+}
+
+/// Surfaces a straight line may pass before it counts as blocked: bounds the work where surfaces coincide.
+const MOST_PASSED: u32 = 4096;
+
+/// The estimator, shared with `volpathmis`.
+pub(super) struct VolPath {
+    limits: PathLimits,
+}
+
+impl VolPath {
+    pub(super) fn new(p: &Properties<'_>) -> Self {
+        VolPath { limits: PathLimits::new(p) }
+    }
+}
+
+forward_integrator!(VolPath);
+
+impl RadianceEstimator for VolPath {
+    fn radiance(
+        &self,
+        scene: &Scene,
+        ray: &Ray,
+        stream: &mut Stream<'_>,
+        arena: &mut Arena,
+        _aovs: &mut [f32],
+    ) -> Radiance {
+        let PathLimits { max_depth, rr_depth, hide_emitters } = self.limits;
+        let mut found = Radiance::default();
+        let visible_environment = !hide_emitters && scene.environment().is_some();
+        found.alpha = f32::from(visible_environment);
+        let mut ray = *ray;
+        let mut throughput = Rgb::WHITE;
+        let mut eta = 1.0;
+        let mut depth = 0;
+        let mut passed = 0;
+        // Of the last vertex that changed the direction; none at the camera and after a delta lobe.
+        let mut last: Option<Scattered> = None;
+        // The reference picks the colour channel that media are sampled by.
+        stream.next_1d();
+        loop {
+            let q = survival(throughput, eta);
+            let u = stream.next_1d();
+            if throughput.is_black() || depth >= max_depth {
+                break;
+            }
+            if depth > rr_depth {
+                if u >= q {
+                    break;
+                }
+                throughput *= 1.0 / q;
+            }
+            found.rays += 1;
+            let hit = scene.intersect_surface(&ray);
+            if !(depth == 0 && hide_emitters) {
+                found.rgb += throughput * weighted_emission(scene, &ray, hit.as_ref(), last);
+            }
+            let Some(hit) = hit else { break };
+            let bsdf = scene.bsdf(&hit);
+            let bxdf = bsdf.resolve(&hit, arena);
+            if depth + 1 < max_depth
+                && bsdf.lobes().is_smooth()
+                && let Some((_, light)) = scene.sample_emitter(hit.p, stream.next_2d())
+            {
+                let (value, pdf) = bxdf.eval_pdf(hit.wi, hit.to_local(light.point.d), Transport::Radiance);
+                let mut contribution = value * light.weight;
+                if !contribution.is_black() {
+                    contribution *= transmittance(scene, &hit, &light, &mut found.rays);
+                    found.rgb += throughput * contribution * if light.delta { 1.0 } else { mis_weight(light.pdf, pdf) };
+                }
+            }
+            let (u1, u2) = (stream.next_1d(), stream.next_2d());
+            let Some(sample) = bxdf.sample(hit.wi, u1, u2, Transport::Radiance) else { break };
+            throughput *= sample.weight;
+            eta *= sample.eta;
+            let d = hit.to_world(sample.wo);
+            ray = Ray::new(hit.origin_towards(d), d);
+            if sample.lobe == Lobes::NULL {
+                passed += 1;
+                if passed > MOST_PASSED {
+                    break;
+                }
+            } else {
+                depth += 1;
+                found.alpha = 1.0;
+                last = (!sample.lobe.has_delta()).then_some(Scattered { p: hit.p, pdf: sample.pdf });
+            }
+        }
+        found
+    }
+}
+
+/// What of the light survives the straight way to a hit through surfaces that let it pass.
+fn transmittance(scene: &Scene, hit: &SurfaceHit, light: &LightSample, rays: &mut u32) -> Rgb {
+    let mut ray = shadow_ray(hit, light);
+    let mut left = Rgb::WHITE;
+    for _ in 0..MOST_PASSED {
+        *rays += 1;
+        let Some(between) = scene.intersect_surface(&ray) else { return left };
+        left *= scene.bsdf(&between).null_transmission(&between);
+        if left.is_black() {
+            return left;
+        }
+        let o = between.origin_towards(ray.d);
+        let d = if ray.t_max.is_finite() { ray.at(ray.t_max) - o } else { ray.d };
+        ray = Ray { o, d, t_min: 0.0, t_max: ray.t_max };
+    }
+    Rgb::BLACK
+}

@@ -1,0 +1,33 @@
+//! `volpathmis`: as `volpath`, with spectral multiple importance sampling inside media.
+//!
+//! Where a scene holds no medium both are the same estimator.
+//!
+//! | parameter | type | default | meaning |
+//! |---|---|---|---|
+//! | `max_depth`, `rr_depth`, `hide_emitters` | | | as `volpath` |
+//! | `use_spectral_mis` | boolean | true | combine the densities of all colour channels inside media |
+//!
+//! ```xml
+//! <integrator type="volpathmis">
+//!     <integer name="max_depth" value="16"/>
+//! </integrator>
+//! ```
+
+use super::common::{COMMON, PATH};
+use super::volpath::VolPath;
+use lucerna_core::interfaces::Integrator;
+use lucerna_core::scene::{Built, Constructor, Param, Plugin, Properties};
+use std::sync::Arc;
+
+/// Table entry.
+pub const PLUGIN: Plugin = Plugin {
+    name: "volpathmis",
+    aliases: &[],
+    summary: "as volpath, with spectral multiple importance sampling inside media",
+    params: &[COMMON, PATH, &[Param::bool("use_spectral_mis", true, "combine all channels inside media")]],
+    build: Constructor::Integrator(build),
+};
+
+fn build(p: &Properties<'_>) -> Built<dyn Integrator> {
+    Ok(Arc::new(VolPath::new(p)))
+}

@@ -1,0 +1,73 @@
+//! The command line: one file per subcommand.
+
+mod convert;
+mod info;
+mod plugins;
+mod progress;
+mod render;
+mod scene_args;
+
+use clap::{Parser, Subcommand};
+use lucerna_core::scene::Registry;
+use std::process::ExitCode;
+
+/// Exit code of a run that could not be done.
+const FAILURE: u8 = 2;
+
+#[derive(Parser)]
+#[command(name = "lucerna", version, about, arg_required_else_help = true)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Render a scene (without one: the built-in Cornell box)
+    Render(Box<render::Arguments>),
+    /// Write an old scene in today's language
+    Convert(convert::Arguments),
+    /// List plugins, or the parameters of one
+    Plugins(plugins::Arguments),
+    /// Show what a scene holds
+    Info(info::Arguments),
+}
+
+/// What went wrong, ready to print; the word `error:` is already in it.
+pub struct Failure(String);
+
+impl Failure {
+    /// A message without a position.
+    fn new(message: impl std::fmt::Display) -> Self {
+        Failure(format!("error: {message}"))
+    }
+}
+
+impl From<lucerna_core::scene::SceneErrors> for Failure {
+    fn from(errors: lucerna_core::scene::SceneErrors) -> Self {
+        Failure(errors.to_string())
+    }
+}
+
+/// Parses the arguments and does what they say.
+pub fn run(registry: &Registry) -> ExitCode {
+    let arguments = Arguments::parse();
+    let done = match arguments.command {
+        Command::Render(arguments) => render::run(registry, &arguments),
+        Command::Convert(arguments) => convert::run(&arguments),
+        Command::Plugins(arguments) => plugins::run(registry, &arguments),
+        Command::Info(arguments) => info::run(registry, &arguments),
+    };
+    done.unwrap_or_else(|Failure(message)| {
+        eprintln!("{message}");
+        ExitCode::from(FAILURE)
+    })
+}
+
+/// `key=value` of an option.
+fn key_value(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((key, value)) if !key.is_empty() => Ok((key.to_owned(), value.to_owned())),
+        _ => Err("expected name=value".to_owned()),
+    }
+}

@@ -1,0 +1,386 @@
+//! `lucerna render`: a scene to a picture.
+
+use super::progress::Bar;
+use super::scene_args::{SceneArguments, default_output};
+use super::{Failure, key_value};
+use clap::Args;
+use lucerna_core::image::{self, Image, exr, png};
+use lucerna_core::interfaces::{ComponentFormat, FileFormat, Integrator};
+use lucerna_core::math::UVec2;
+use lucerna_core::render::{Budget, Control, RenderContext, Report, SampleOrder, replay};
+use lucerna_core::scene::{
+    BuiltSensor, Description, Location, Node, Object, ObjectKind, Parameter, Registry, Scene, Value, build_one,
+};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::OnceLock;
+
+/// Exit code of a run that met bad samples under `--strict-nan`.
+const BAD_SAMPLES: u8 = 3;
+
+/// Options of `render`.
+#[derive(Args)]
+pub struct Arguments {
+    #[command(flatten)]
+    scene: SceneArguments,
+
+    /// Where to write: .exr, .png, .pfm or .hdr; next to the scene by default
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+
+    /// Samples per pixel, instead of what the scene says
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    spp: Option<u32>,
+
+    /// Render for so many seconds instead
+    #[arg(long, value_name = "S", conflicts_with = "spp", value_parser = positive)]
+    seconds: Option<f64>,
+
+    /// Chooses the random numbers
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u32,
+
+    /// Which sensor of the scene, counted from 0
+    #[arg(short, long, value_name = "N", default_value_t = 0)]
+    sensor: usize,
+
+    /// Number of threads; all cores by default
+    #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+
+    /// Another integrator, as NAME or NAME:parameter=value,…
+    #[arg(long, value_name = "NAME")]
+    integrator: Option<String>,
+
+    /// Another sampler, as NAME or NAME:parameter=value,…
+    #[arg(long, value_name = "NAME")]
+    sampler: Option<String>,
+
+    /// Render a part only: x,y,width,height in pixels
+    #[arg(long, value_name = "X,Y,W,H", value_parser = numbers::<4>)]
+    crop: Option<[u32; 4]>,
+
+    /// Replay one sample of this pixel and print its value
+    #[arg(long, value_name = "X,Y", value_parser = numbers::<2>)]
+    pixel: Option<[u32; 2]>,
+
+    /// Which sample to replay
+    #[arg(long, value_name = "K", default_value_t = 0, requires = "pixel")]
+    sample: u32,
+
+    /// Exit with code 3 if any sample was NaN, infinite or negative
+    #[arg(long)]
+    strict_nan: bool,
+
+    /// Refuse to start if the picture needs more memory than so many MiB
+    #[arg(long, value_name = "MIB", default_value_t = 16384)]
+    max_memory: u64,
+
+    /// Write a summary in JSON
+    #[arg(long, value_name = "FILE")]
+    stats_json: Option<PathBuf>,
+
+    /// No progress bar and no summary
+    #[arg(short, long)]
+    quiet: bool,
+
+    /// Spend random numbers in the order of the reference's scalar_rgb, as if it ran with so many threads
+    #[arg(long, value_name = "THREADS", hide = true, num_args = 0..=1, default_missing_value = "3")]
+    reference_order: Option<u32>,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if seconds >= 0.0 && seconds.is_finite() => Ok(seconds),
+        _ => Err("expected a number of seconds".to_owned()),
+    }
+}
+
+fn numbers<const N: usize>(text: &str) -> Result<[u32; N], String> {
+    let list: Result<Vec<u32>, _> = text.split(',').map(|part| part.trim().parse::<u32>()).collect();
+    list.ok().and_then(|list| list.try_into().ok()).ok_or_else(|| format!("expected {N} whole numbers"))
+}
+
+/// Ctrl-C asks the running render to stop; the second one ends the program.
+fn stop_on_interrupt(control: &'static Control<'static>) {
+    let mut pressed = false;
+    // A program that embeds this one may have a handler of its own; then Ctrl-C is its business.
+    let _ = ctrlc::set_handler(move || {
+        if std::mem::replace(&mut pressed, true) {
+            std::process::exit(130);
+        }
+        control.stop();
+    });
+}
+
+/// Renders.
+pub fn run(registry: &Registry, arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let output = arguments.output.clone().unwrap_or_else(|| default_output(arguments.scene.scene.as_deref()));
+    if arguments.pixel.is_none() {
+        image::check_writable(&output).map_err(|e| Failure::new(format!("{}: {e}", output.display())))?;
+    }
+    if let Some(threads) = arguments.threads {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads.into())
+            .build_global()
+            .map_err(|e| Failure::new(format!("cannot start {threads} threads: {e}")))?;
+    }
+    let mut description = arguments.scene.describe()?;
+    if let Some(text) = &arguments.integrator {
+        replace_child(&mut description, ObjectKind::Integrator, text)?;
+    }
+    let scene = arguments.scene.build(registry, description)?.scene;
+    let camera = camera(registry, &scene, arguments)?;
+    let integrator = scene
+        .integrator()
+        .ok_or_else(|| {
+            Failure::new(format!(
+                "{}: the scene names no integrator (add one, or --integrator path)",
+                arguments.scene.name()
+            ))
+        })?
+        .clone();
+    let budget = match (arguments.seconds, arguments.spp) {
+        (Some(seconds), _) => Budget::Seconds(seconds),
+        (None, spp) => Budget::Samples(camera.sampler.round_spp(spp.unwrap_or(camera.sampler.sample_count()))),
+    };
+    tell_rounding(arguments, budget);
+    render(arguments, &scene, &camera, &*integrator, budget, &output)
+}
+
+fn tell_rounding(arguments: &Arguments, budget: Budget) {
+    if let (Some(asked), Budget::Samples(spp)) = (arguments.spp, budget)
+        && asked != spp
+    {
+        eprintln!("note: {asked} samples per pixel become {spp}: the sampler needs such a number");
+    }
+}
+
+/// The chosen sensor, with another sampler if one is asked for.
+fn camera(registry: &Registry, scene: &Scene, arguments: &Arguments) -> Result<BuiltSensor, Failure> {
+    let count = scene.sensors().len();
+    let mut camera = scene.sensors().get(arguments.sensor).cloned().ok_or_else(|| match count {
+        0 => Failure::new(format!("{}: the scene has no sensor", arguments.scene.name())),
+        _ => Failure::new(format!("there is no sensor {}: the scene has {count}, counted from 0", arguments.sensor)),
+    })?;
+    if let Some(text) = &arguments.sampler {
+        let node = short_form(ObjectKind::Sampler, text)?;
+        if let Object::Sampler(sampler) = build_one(registry, &Description::of(node))? {
+            camera.sampler = sampler;
+        }
+    }
+    Ok(camera)
+}
+
+fn render(
+    arguments: &Arguments,
+    scene: &Scene,
+    camera: &BuiltSensor,
+    integrator: &dyn Integrator,
+    budget: Budget,
+    output: &Path,
+) -> Result<ExitCode, Failure> {
+    // The handler of Ctrl-C and the progress bar live as long as the program.
+    static BAR: OnceLock<Bar> = OnceLock::new();
+    static CONTROL: OnceLock<Control<'static>> = OnceLock::new();
+    let bar = BAR.get_or_init(|| Bar::new(arguments.quiet));
+    let control = CONTROL.get_or_init(|| {
+        let started = std::time::Instant::now();
+        let show: &'static (dyn Fn(_) + Sync) =
+            Box::leak(Box::new(move |progress| bar.show(progress, started.elapsed().as_secs_f64())));
+        let control = Control::new().with_progress(show);
+        match budget {
+            Budget::Seconds(seconds) => control.with_deadline(seconds),
+            Budget::Samples(_) => match integrator.timeout() {
+                Some(seconds) => control.with_deadline(seconds),
+                None => control,
+            },
+        }
+    });
+    stop_on_interrupt(control);
+
+    let mut cx = RenderContext::new(scene, camera, budget, arguments.seed, control, integrator.aov_names());
+    if let Some([x, y, width, height]) = arguments.crop {
+        crop(&mut cx, UVec2::new(x, y), UVec2::new(width, height))?;
+    }
+    let needed = lucerna_core::render::FilmStore::bytes(cx.film.crop_size, integrator.aov_names().len()) >> 20;
+    if needed > arguments.max_memory {
+        let message = format!("the picture needs {needed} MiB, the limit is {} MiB", arguments.max_memory);
+        return Err(Failure::new(format!("{message} (raise it with --max-memory)")));
+    }
+    if let Some(threads) = arguments.reference_order {
+        cx.order = SampleOrder::Reference { threads };
+    }
+    if let Some([x, y]) = arguments.pixel {
+        return replay_pixel(&cx, integrator, UVec2::new(x, y), arguments.sample);
+    }
+    let report = integrator.render(&mut cx).map_err(Failure::new)?;
+    bar.finish();
+    write(arguments, &cx, &report, output)?;
+    summary(arguments, &cx, &report, output)?;
+    let bad = report.bad.count > 0 && arguments.strict_nan;
+    Ok(if bad { ExitCode::from(BAD_SAMPLES) } else { ExitCode::SUCCESS })
+}
+
+fn crop(cx: &mut RenderContext<'_>, offset: UVec2, size: UVec2) -> Result<(), Failure> {
+    let film = cx.film.size;
+    let inside = offset.checked_add(size).is_some_and(|end| end.cmple(film).all());
+    if !inside || size.min_element() == 0 {
+        return Err(Failure::new(format!("--crop must lie inside the film of {} x {} pixels", film.x, film.y)));
+    }
+    cx.crop(offset, size);
+    Ok(())
+}
+
+fn replay_pixel(
+    cx: &RenderContext<'_>,
+    integrator: &dyn Integrator,
+    pixel: UVec2,
+    sample: u32,
+) -> Result<ExitCode, Failure> {
+    let estimator =
+        integrator.estimator().ok_or_else(|| Failure::new("this integrator has no samples that can be replayed"))?;
+    if pixel.cmpge(cx.film.size).any() {
+        let film = cx.film.size;
+        return Err(Failure::new(format!("--pixel must lie inside the film of {} x {} pixels", film.x, film.y)));
+    }
+    let value = replay(cx, estimator, pixel, sample);
+    let [r, g, b] = value.rgb.to_array();
+    println!(
+        "pixel {},{} sample {sample}: {r:?} {g:?} {b:?} alpha {:?} ({} rays)",
+        pixel.x, pixel.y, value.alpha, value.rays
+    );
+    Ok(ExitCode::SUCCESS)
+}
+
+fn write(arguments: &Arguments, cx: &RenderContext<'_>, report: &Report, output: &Path) -> Result<(), Failure> {
+    let (channels, data) = cx.store.develop(&cx.film);
+    let size = cx.store.size();
+    let picture = Image { width: size.x, height: size.y, channels, data };
+    let extension = output.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    let written = match extension.as_deref() {
+        Some("exr") => exr::write(output, &picture, &exr_options(arguments, cx, report)),
+        Some("png") => png::write_srgb(output, &picture),
+        _ => image::write(output, &picture),
+    };
+    written.map_err(|e| Failure::new(format!("{}: {e}", output.display())))
+}
+
+fn exr_options(arguments: &Arguments, cx: &RenderContext<'_>, report: &Report) -> exr::ExrOptions {
+    use exr::{Attribute, HalfChannels};
+    let half = match (cx.film.component_format, cx.film.file_format) {
+        (ComponentFormat::Float16, FileFormat::OpenExr) => HalfChannels::All,
+        _ => HalfChannels::None,
+    };
+    let text = |s: &str| Attribute::Text(s.to_owned());
+    exr::ExrOptions {
+        half,
+        attributes: vec![
+            ("lucerna:version".to_owned(), text(env!("CARGO_PKG_VERSION"))),
+            ("lucerna:scene".to_owned(), text(&arguments.scene.name())),
+            ("lucerna:integrator".to_owned(), text(arguments.integrator.as_deref().unwrap_or("scene"))),
+            ("lucerna:seed".to_owned(), Attribute::Number(f64::from(cx.seed))),
+            ("lucerna:spp".to_owned(), Attribute::Number(f64::from(report.spp))),
+            ("lucerna:samples".to_owned(), Attribute::Number(report.samples as f64)),
+            ("lucerna:seconds".to_owned(), Attribute::Number(report.seconds)),
+        ],
+        ..exr::ExrOptions::default()
+    }
+}
+
+fn summary(arguments: &Arguments, cx: &RenderContext<'_>, report: &Report, output: &Path) -> Result<(), Failure> {
+    let seconds = report.seconds.max(1e-9);
+    let (rate, ray_rate) = (report.samples as f64 / seconds / 1e6, report.rays as f64 / seconds / 1e6);
+    if report.bad.count > 0 {
+        let share = report.bad.count as f64 / report.samples as f64;
+        eprintln!(
+            "warning: {} samples ({share:.1e} of all) were NaN, infinite or negative and left out",
+            report.bad.count
+        );
+        for bad in &report.bad.first {
+            let (x, y) = (bad.pixel.x, bad.pixel.y);
+            eprintln!(
+                "warning:   {:?}; repeat with --pixel {x},{y} --sample {} --seed {}",
+                bad.value, bad.sample, arguments.seed
+            );
+        }
+    }
+    if !arguments.quiet {
+        let stopped = if report.stopped { ", stopped early" } else { "" };
+        eprintln!(
+            "{}: {} x {} pixels, {} spp{stopped}, {seconds:.2} s, {rate:.2} Msamples/s, {ray_rate:.2} Mrays/s{}",
+            output.display(),
+            cx.store.size().x,
+            cx.store.size().y,
+            report.spp,
+            peak_memory().map_or_else(String::new, |mib| format!(", {mib} MiB"))
+        );
+    }
+    if let Some(path) = &arguments.stats_json {
+        let stats = json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "spp": report.spp,
+            "samples": report.samples,
+            "rays": report.rays,
+            "render_seconds": report.seconds,
+            "msamples_per_second": rate,
+            "mrays_per_second": ray_rate,
+            "bad_samples": report.bad.count,
+            "stopped": report.stopped,
+            "peak_memory_mib": peak_memory(),
+        });
+        std::fs::write(path, format!("{stats:#}\n")).map_err(|e| Failure::new(format!("{}: {e}", path.display())))?;
+    }
+    Ok(())
+}
+
+/// Largest resident size of the process so far in MiB, where the system tells.
+fn peak_memory() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+    line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib >> 10)
+}
+
+/// Puts an object from the command line in the place of the scene's own.
+fn replace_child(description: &mut Description, kind: ObjectKind, text: &str) -> Result<(), Failure> {
+    let node = short_form(kind, text)?;
+    let at = node.at.clone();
+    let id = description.add(node);
+    let root = description.root;
+    let old: Vec<String> = description
+        .children(root)
+        .filter(|(_, child)| description.node(*child).kind == kind)
+        .map(|(parameter, _)| parameter.name.clone())
+        .collect();
+    let parameters = &mut description.node_mut(root).parameters;
+    parameters.retain(|p| !old.contains(&p.name));
+    parameters.push(Parameter { name: format!("_{}", kind.tag()), value: Value::Object(id), at });
+    Ok(())
+}
+
+/// `name` or `name:parameter=value,parameter=value` as a node.
+fn short_form(kind: ObjectKind, text: &str) -> Result<Node, Failure> {
+    let (plugin, rest) = text.split_once(':').unwrap_or((text, ""));
+    let at = Location::file(format!("--{}", kind.tag()));
+    let mut parameters = Vec::new();
+    for item in rest.split(',').filter(|item| !item.is_empty()) {
+        let (name, value) =
+            key_value(item).map_err(|e| Failure::new(format!("--{} {text}: \"{item}\": {e}", kind.tag())))?;
+        parameters.push(Parameter { name, value: plain_value(&value), at: at.clone() });
+    }
+    Ok(Node { kind, plugin: plugin.to_owned(), id: None, parameters, at, included_from: Vec::new() })
+}
+
+/// A value of the command line: the narrowest type it can be.
+fn plain_value(text: &str) -> Value {
+    if let Ok(v) = text.parse::<i64>() {
+        Value::Integer(v)
+    } else if let Ok(v) = text.parse::<f64>() {
+        Value::Float(v)
+    } else if let Ok(v) = text.parse::<bool>() {
+        Value::Boolean(v)
+    } else {
+        Value::String(text.to_owned())
+    }
+}

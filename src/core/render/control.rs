@@ -1,0 +1,121 @@
+//! How long to render, and how to be told and stopped meanwhile.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// How long to render.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Budget {
+    /// So many samples per pixel.
+    Samples(u32),
+    /// So many seconds of wall-clock time, at least one pass.
+    Seconds(f64),
+}
+
+/// The sample ranges of the passes: 1, 1, 2, 4, 8, then 16 samples each. It depends on nothing but the pass, so that
+/// a run that stops early is the beginning of a longer one.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Schedule;
+
+impl Schedule {
+    /// Most samples per pixel in one pass.
+    const LARGEST: u32 = 16;
+
+    /// First sample of a pass, and the first of the next one.
+    pub fn pass(index: u32) -> (u32, u32) {
+        let start = |i: u32| match i {
+            0 => 0,
+            1..=5 => 1 << (i - 1),
+            _ => Self::LARGEST.saturating_mul(i - 4),
+        };
+        (start(index), start(index + 1))
+    }
+}
+
+/// How far a render is.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress {
+    /// Part of the work that is done, in [0, 1].
+    pub fraction: f64,
+    /// Pixel samples so far.
+    pub samples: u64,
+    /// Samples per pixel in complete passes.
+    pub spp: u32,
+}
+
+/// Stop button, deadline and progress of a run.
+pub struct Control<'a> {
+    stop: AtomicBool,
+    started: Instant,
+    deadline: Option<Instant>,
+    on_progress: Option<&'a (dyn Fn(Progress) + Sync)>,
+}
+
+impl Default for Control<'_> {
+    fn default() -> Self {
+        Control { stop: AtomicBool::new(false), started: Instant::now(), deadline: None, on_progress: None }
+    }
+}
+
+impl<'a> Control<'a> {
+    /// A run that starts now.
+    pub fn new() -> Self {
+        Control::default()
+    }
+
+    /// Stops by itself after so many seconds.
+    pub fn with_deadline(mut self, seconds: f64) -> Self {
+        // More than a century is no deadline (and would overflow the clock).
+        self.deadline = (seconds < 3.2e9).then(|| self.started + std::time::Duration::from_secs_f64(seconds.max(0.0)));
+        self
+    }
+
+    /// Calls a function as work gets done, from any thread.
+    pub fn with_progress(mut self, on_progress: &'a (dyn Fn(Progress) + Sync)) -> Self {
+        self.on_progress = Some(on_progress);
+        self
+    }
+
+    /// Asks the run to stop soon and keep what it has.
+    pub fn stop(&self) {
+        self.stop.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether the run should end.
+    pub fn should_stop(&self) -> bool {
+        self.stop.load(Ordering::Relaxed) || self.deadline.is_some_and(|d| Instant::now() >= d)
+    }
+
+    /// Seconds since the start.
+    pub fn seconds(&self) -> f64 {
+        self.started.elapsed().as_secs_f64()
+    }
+
+    /// Part of the time until the deadline that has passed, if there is one.
+    pub fn time_fraction(&self) -> Option<f64> {
+        let total = self.deadline?.duration_since(self.started).as_secs_f64();
+        Some(if total > 0.0 { (self.seconds() / total).min(1.0) } else { 1.0 })
+    }
+
+    pub(crate) fn progress(&self, progress: Progress) {
+        if let Some(on_progress) = self.on_progress {
+            on_progress(progress);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn passes_follow_each_other() {
+        let mut next = 0;
+        for pass in 0..40 {
+            let (start, end) = Schedule::pass(pass);
+            assert!(start == next && end > start && end - start <= 16);
+            next = end;
+        }
+        assert_eq!((0..6).map(|i| Schedule::pass(i).1).collect::<Vec<_>>(), [1, 2, 4, 8, 16, 32]);
+    }
+}

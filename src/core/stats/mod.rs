@@ -1,0 +1,3 @@
+//! Statistics that tests and comparisons rest on.
+
+pub mod chi2;
