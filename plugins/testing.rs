@@ -17,8 +17,8 @@ impl Draft {
             search_path: vec![concat!(env!("CARGO_MANIFEST_DIR"), "/shapes/golden").into()],
             notes: Vec::new(),
             warnings: Vec::new(),
-        confined_to: None,
-        file_versions: Vec::new(),
+            confined_to: None,
+            file_versions: Vec::new(),
         };
         Draft(empty).node(kind, plugin)
     }

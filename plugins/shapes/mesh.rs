@@ -1,9 +1,9 @@
 //! Triangle meshes in world space: what all mesh plugins share.
 
+use super::point_error;
 use lucerna_core::accel::{Accel, BuildOptions, Geometry, Hit, Ray};
 use lucerna_core::interfaces::{AreaSample, Shape, SurfaceHit};
 use lucerna_core::io::{self, MeshAttribute, TriangleMesh};
-use lucerna_core::math::error_bounds::gamma;
 use lucerna_core::math::{Aabb, DMat4, DVec3, Frame, Vec2, Vec3, coordinate_system};
 use lucerna_core::sampling::{Discrete, warp};
 use lucerna_core::scene::{Failed, Properties};
@@ -38,7 +38,7 @@ struct Corner {
 impl Corner {
     fn point(&self) -> (Vec3, Vec3) {
         let [p0, p1, p2] = [self.p[0] * self.b[0], self.p[1] * self.b[1], self.p[2] * self.b[2]];
-        (p0 + p1 + p2, (p0.abs() + p1.abs() + p2.abs()) * gamma(7))
+        (p0 + p1 + p2, point_error(p0.abs() + p1.abs() + p2.abs(), 7))
     }
 
     /// Unit normal by winding; zero for a triangle without area.
@@ -104,21 +104,19 @@ impl Mesh {
         uv0 * corner.b[0] + uv1 * corner.b[1] + uv2 * corner.b[2]
     }
 
-    /// Change of the point with u and v, perpendicular unit vectors where there are no usable texture coordinates.
+    /// Change of the point with u and v; perpendicular unit vectors where the texture coordinates are of no use.
     fn tangents(&self, corner: &Corner, n: Vec3) -> (Vec3, Vec3) {
-        if !self.uvs.is_empty() {
-            let [uv0, uv1, uv2] = corner.indices.map(|i| self.uvs[i]);
-            let (duv1, duv2) = (uv1 - uv0, uv2 - uv0);
-            let (dp1, dp2) = (corner.p[1] - corner.p[0], corner.p[2] - corner.p[0]);
-            let inverse = 1.0 / duv1.perp_dot(duv2);
-            let dp_du = (dp1 * duv2.y - dp2 * duv1.y) * inverse;
-            let dp_dv = (dp2 * duv1.x - dp1 * duv2.x) * inverse;
-            // A map that collapses the triangle to a line has no inverse.
-            if dp_du.is_finite() && dp_dv.is_finite() {
-                return (dp_du, dp_dv);
-            }
+        let (dp1, dp2) = (corner.p[1] - corner.p[0], corner.p[2] - corner.p[0]);
+        if self.uvs.is_empty() {
+            return (dp1, dp2);
         }
-        coordinate_system(n)
+        let [uv0, uv1, uv2] = corner.indices.map(|i| self.uvs[i]);
+        let (duv1, duv2) = (uv1 - uv0, uv2 - uv0);
+        let inverse = 1.0 / duv1.perp_dot(duv2);
+        let dp_du = (dp1 * duv2.y - dp2 * duv1.y) * inverse;
+        let dp_dv = (dp2 * duv1.x - dp1 * duv2.x) * inverse;
+        // A map that collapses the triangle to a line has no inverse.
+        if dp_du.is_finite() && dp_dv.is_finite() { (dp_du, dp_dv) } else { coordinate_system(n) }
     }
 
     /// Interpolated unit normal; the geometric one where there is none to interpolate.

@@ -7,15 +7,18 @@
 mod cube;
 mod cylinder;
 mod disk;
+mod instance;
 mod mesh;
 mod obj;
 mod plane;
 mod ply;
 mod rectangle;
 mod serialized;
+mod shapegroup;
 mod sphere;
 
 use lucerna_core::accel::{Hit, PrimHit, Ray};
+use lucerna_core::math::error_bounds::gamma;
 use lucerna_core::math::{Aabb, Vec3};
 use lucerna_core::scene::description::ObjectKind;
 use lucerna_core::scene::{Param, Plugin};
@@ -25,10 +28,12 @@ pub const PLUGINS: &[Plugin] = &[
     cube::PLUGIN,
     cylinder::PLUGIN,
     disk::PLUGIN,
+    instance::PLUGIN,
     obj::PLUGIN,
     ply::PLUGIN,
     rectangle::PLUGIN,
     serialized::PLUGIN,
+    shapegroup::PLUGIN,
     sphere::PLUGIN,
 ];
 
@@ -68,8 +73,21 @@ fn taken_root(hit: &Hit, roots: Option<[f64; 2]>) -> f64 {
     roots.map_or(f64::from(hit.t), |roots| roots[usize::from(hit.u > 0.0)])
 }
 
+/// Bound on the error of a point of a plane or triangle: the sum of terms of the given `size` after some roundings.
+///
+/// Where a coordinate is 0 it has no relative error, but the double-precision distance to the plane still has one, of
+/// the order of the other coordinates. Without the last term a ray could meet the floor y = 0 that it starts on.
+#[inline]
+fn point_error(size: Vec3, roundings: u32) -> Vec3 {
+    const DOUBLE: f32 = 1.0 / (1u64 << 40) as f32;
+    size * gamma(roundings) + Vec3::splat(size.max_element() * DOUBLE)
+}
+
 /// A box around points that are known to an error on each axis.
 fn enclose<const N: usize>(points: [Vec3; N], error: Vec3) -> Aabb {
     let Aabb { min, max } = Aabb::of_points(points);
     Aabb { min: (min - error).map(f32::next_down), max: (max + error).map(f32::next_up) }
 }
+
+#[cfg(test)]
+mod tests;

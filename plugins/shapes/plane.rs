@@ -1,6 +1,6 @@
 //! A plane patch in world space: what `rectangle` and `disk` share.
 
-use lucerna_core::math::error_bounds::gamma;
+use super::point_error;
 use lucerna_core::math::{Frame, Vec2, Vec3};
 use lucerna_core::scene::{Failed, Properties};
 
@@ -45,7 +45,7 @@ impl Plane {
         let (x, y) = (self.x * local.x, self.y * local.y);
         // Four roundings on the way, and one of each stored vector, whose size does not shrink with `local`.
         let size = self.center.abs() + self.x.abs() + self.y.abs();
-        (self.center + x + y, size * gamma(5))
+        (self.center + x + y, point_error(size, 5))
     }
 
     /// The frame about the normal along a tangent.

@@ -184,6 +184,13 @@ impl Sphere {
         }
     }
 
+    /// A sample of uniform area density at a point of the unit sphere.
+    fn sample_at(&self, outwards: Vec3) -> AreaSample {
+        let p = self.ball.center + outwards * self.ball.radius;
+        let uv = Self::uv(self.to_local(outwards));
+        AreaSample { p, p_error: self.ball.error(p), n: self.orient(outwards), uv, pdf: 1.0 / self.area() }
+    }
+
     /// How the sphere is seen from outside; `None` from inside. The side the surface lies on is the one it shines to.
     fn view(&self, from: Vec3) -> Option<View> {
         let radius = f64::from(self.ball.radius);
@@ -221,16 +228,13 @@ impl Shape for Sphere {
     }
 
     fn sample_area(&self, u2: Vec2) -> Option<AreaSample> {
-        let local = warp::square_to_sphere(u2);
-        let outwards = self.to_world(local);
-        let p = self.ball.center + outwards * self.ball.radius;
-        let (n, uv) = (self.orient(outwards), Self::uv(local));
-        Some(AreaSample { p, p_error: self.ball.error(p), n, uv, pdf: 1.0 / self.area() })
+        Some(self.sample_at(self.to_world(warp::square_to_sphere(u2))))
     }
 
     fn sample_direct(&self, from: Vec3, u2: Vec2) -> Option<(LightPoint, Vec3, f32)> {
         let Some(view) = self.view(from) else {
-            let sample = self.sample_area(u2)?;
+            // By area, about the axes of the world as the reference does.
+            let sample = self.sample_at(warp::square_to_sphere(u2));
             let (point, pdf) = sample.as_seen_from(from)?;
             return Some((point, sample.p_error, pdf));
         };

@@ -301,7 +301,7 @@ fn transform_hit(hit: &SurfaceHit, to_world: &Transform) -> SurfaceHit {
     use crate::math::{Frame, error_bounds::gamma};
     let p = to_world.point(hit.p);
     // Error of the point in the group, carried through the matrix, plus the rounding of the transform itself
-    // (Pharr, Jakob, Humphreys 2023, section 6.8.1).
+    // (Pharr, Jakob, Humphreys 2023, section 6.8.1) and that of the leaving ray when it is taken back to the group.
     let abs = |v: Vec3| {
         let m = to_world.matrix;
         m.x_axis.truncate().abs() * v.x.abs()
@@ -309,7 +309,7 @@ fn transform_hit(hit: &SurfaceHit, to_world: &Transform) -> SurfaceHit {
             + m.z_axis.truncate().abs() * v.z.abs()
     };
     let p_error =
-        abs(hit.p_error) * (1.0 + gamma(3)) + (abs(hit.p) + to_world.matrix.w_axis.truncate().abs()) * gamma(3);
+        abs(hit.p_error) * (1.0 + gamma(3)) + (abs(hit.p) + to_world.matrix.w_axis.truncate().abs()) * gamma(6);
     // A mirroring instance must not turn the normals of its group over: the reference does not either.
     let n = to_world.normal(hit.n).normalize_or_zero();
     let shading = to_world.normal(hit.frame.n).normalize_or_zero();
