@@ -93,7 +93,13 @@ impl RadianceEstimator for Path {
                 found.rgb += throughput * direct_light(scene, &hit, bxdf, &light, &mut found.rays);
             }
             let (u1, u2) = (stream.next_1d(), stream.next_2d());
-            let Some(sample) = bxdf.sample(hit.wi, u1, u2, Transport::Radiance) else { break };
+            let sample = bxdf.sample(hit.wi, u1, u2, Transport::Radiance);
+            // Drawn at every vertex, needed or not: the numbers of the next sample depend on it in the reference's order.
+            let u_roulette = stream.next_1d();
+            let Some(sample) = sample else {
+                found.alpha = 1.0;
+                break;
+            };
             throughput *= sample.weight;
             eta *= sample.eta;
             if sample.lobe != Lobes::NULL {
@@ -104,13 +110,12 @@ impl RadianceEstimator for Path {
             last = (!sample.lobe.has_delta()).then_some(Scattered { p: hit.p, pdf: sample.pdf });
             depth += 1;
 
-            let u = stream.next_1d();
             if throughput.is_black() {
                 break;
             }
             if depth >= rr_depth {
                 let q = survival(throughput, eta);
-                if u >= q {
+                if u_roulette >= q {
                     break;
                 }
                 throughput *= 1.0 / q;

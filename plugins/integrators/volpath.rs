@@ -110,7 +110,12 @@ impl RadianceEstimator for VolPath {
                 }
             }
             let (u1, u2) = (stream.next_1d(), stream.next_2d());
-            let Some(sample) = bxdf.sample(hit.wi, u1, u2, Transport::Radiance) else { break };
+            let Some(sample) = bxdf.sample(hit.wi, u1, u2, Transport::Radiance) else {
+                // The reference notices at the start of the next vertex, and draws the roulette's number first.
+                stream.next_1d();
+                found.alpha = 1.0;
+                break;
+            };
             throughput *= sample.weight;
             eta *= sample.eta;
             let d = hit.to_world(sample.wo);

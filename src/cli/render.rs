@@ -130,7 +130,10 @@ pub fn run(registry: &Registry, arguments: &Arguments) -> Result<ExitCode, Failu
     if let Some(text) = &arguments.integrator {
         replace_child(&mut description, ObjectKind::Integrator, text)?;
     }
-    let scene = arguments.scene.build(registry, description)?.scene;
+    let mut scene = arguments.scene.build(registry, description)?.scene;
+    if arguments.reference_order.is_some() {
+        scene.use_reference_offsets();
+    }
     let camera = camera(registry, &scene, arguments)?;
     let integrator = scene
         .integrator()
