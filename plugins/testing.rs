@@ -59,6 +59,7 @@ impl Draft {
         self.set(name, Value::String(value.to_owned()))
     }
 
+    #[expect(clippy::wrong_self_convention, reason = "named after the parameter it sets")]
     pub fn to_world(self, matrix: DMat4) -> Self {
         self.set("to_world", Value::Transform(matrix))
     }

@@ -109,3 +109,46 @@ impl Film for HdrFilm {
         &self.0
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Draft;
+    use lucerna_core::scene::Object;
+
+    fn draft() -> Draft {
+        Draft::new(ObjectKind::Film, "hdrfilm").int("width", 40).int("height", 30)
+    }
+
+    fn settings(draft: &Draft) -> FilmSettings {
+        match draft.build() {
+            Ok(Object::Film(film)) => film.settings().clone(),
+            Ok(_) => panic!("not a film"),
+            Err(errors) => panic!("{errors}"),
+        }
+    }
+
+    #[test]
+    fn the_window_is_what_is_asked_for_or_left() {
+        let all = settings(&draft());
+        assert_eq!((all.size, all.crop_offset, all.crop_size), (UVec2::new(40, 30), UVec2::ZERO, UVec2::new(40, 30)));
+        assert_eq!(all.filter.radius(), 2.0);
+        let one = settings(&draft().int("crop_offset_x", 39).int("crop_width", 1).int("crop_offset_y", 10));
+        assert_eq!((one.crop_offset, one.crop_size), (UVec2::new(39, 10), UVec2::new(1, 20)));
+        let words = draft().string("pixel_format", "RGBA").string("component_format", "float32");
+        let words = settings(&words.string("file_format", "pfm"));
+        assert_eq!(words.pixel_format, PixelFormat::Rgba);
+        assert_eq!((words.component_format, words.file_format), (ComponentFormat::Float32, FileFormat::Pfm));
+    }
+
+    #[test]
+    fn hc_e09_e10_senseless_sizes_are_refused() {
+        assert!(draft().int("crop_offset_x", 40).errors().contains("crop window"));
+        assert!(draft().int("crop_offset_y", 20).int("crop_height", 11).errors().contains("crop window"));
+        for size in [-5, 0, 65_537, 2_000_000] {
+            let film = Draft::new(ObjectKind::Film, "hdrfilm").int("width", size);
+            assert!(film.errors().contains("width"), "{size}");
+        }
+        assert!(draft().string("pixel_format", "cmyk").errors().contains("pixel_format"));
+    }
+}

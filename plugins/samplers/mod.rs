@@ -74,7 +74,7 @@ fn dimension_key(pixel: u64, counted: Counted, dimension: u32) -> u64 {
     mix(pixel ^ (u64::from(dimension) << 1 | counted as u64))
 }
 
-/// `n` unbiased numbers in [0, 1) for a sample of a dimension: where in its stratum a point lies.
+/// Two numbers in [0, 1) for a sample of a dimension: where in its stratum a point lies.
 #[inline]
 fn jitters(dimension_key: u64, sample: u32) -> (f32, f32) {
     let bits = mix(dimension_key ^ u64::from(sample).wrapping_mul(0xd6e8_feb8_6659_fd93));

@@ -47,7 +47,7 @@ fn build(p: &Properties<'_>) -> Built<dyn Sampler> {
 
 /// The smallest prime whose power is large enough; the largest whose power fits 32 bits if there is none.
 fn levels(asked: u32, strength: u32) -> u32 {
-    let is_prime = |n: u32| n >= 2 && (2..).take_while(|d| d * d <= n).all(|d| n % d != 0);
+    let is_prime = |n: u32| n >= 2 && (2..).take_while(|d| d * d <= n).all(|d| !n.is_multiple_of(d));
     let fits = |n: u32| n.checked_pow(strength);
     let mut best = 2;
     for n in (2..).take_while(|n| fits(*n).is_some()).filter(|n| is_prime(*n)) {

@@ -189,6 +189,7 @@ impl Shape for Mesh {
         self.hit_on(hit.t, hit.prim, Vec2::new(hit.u, hit.v))
     }
 
+    /// With the geometric normal, which the density per solid angle needs; the reference takes the interpolated one.
     fn sample_area(&self, u2: Vec2) -> Option<AreaSample> {
         let (triangle, rest) = self.choice()?.sample_reuse(u2.y);
         let corner = self.corner(triangle, warp::square_to_triangle(Vec2::new(u2.x, rest)));

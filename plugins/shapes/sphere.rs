@@ -250,7 +250,7 @@ impl Shape for Sphere {
         let across = (s.as_dvec3() * cos_phi + t.as_dvec3() * sin_phi) * sin2.sqrt();
         let d = across - view.to_viewer * cos;
         let outwards = ((view.to_viewer * view.distance + d * distance) / radius).normalize_or_zero();
-        if !(distance > 0.0) {
+        if distance.is_nan() || distance <= 0.0 {
             return None;
         }
         let p = (self.ball.center.as_dvec3() + outwards * radius).as_vec3();

@@ -98,3 +98,31 @@ fn flipped_and_flat_meshes() {
     assert!((flat.frame.n - flat.n).length() < 1e-6 && (plain.frame.n - plain.n).length() > 1e-3);
     assert!(flipped.frame.s.cross(flipped.frame.t).dot(flipped.frame.n) > 0.999);
 }
+
+/// Texture coordinates that collapse, are huge or missing; a normal that vanishes between opposite ones.
+#[test]
+fn hc_g07_g08_frames_are_finite_and_orthonormal() {
+    let folder = std::env::temp_dir().join(format!("lucerna-frames-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let corners = "v 0 0 0\nv 2 0 0\nv 0 2 0\n";
+    let files = [
+        "vt 0.5 0.5\nf 1/1 2/1 3/1\n",
+        "vt 1e6 1e6\nvt 1000001 1e6\nvt 1e6 1000001\nf 1/1 2/2 3/3\n",
+        "vt 0 0\nvt 1e-30 0\nvt 0 1e-30\nf 1/1 2/2 3/3\n",
+        "f 1 2 3\n",
+        "vn 1 0 0\nvn -1 0 0\nvn 0 0 0\nf 1//1 2//2 3//3\n",
+    ];
+    for (number, file) in files.into_iter().enumerate() {
+        let path = folder.join(format!("{number}.obj"));
+        std::fs::write(&path, format!("{corners}{file}")).expect("a file");
+        let traced = Traced::new(shape(&draft("obj").string("filename", &path.to_string_lossy())));
+        for (x, y) in [(0.5, 0.5), (1.0, 0.0), (0.999, 1e-4), (0.1, 1.7)] {
+            let Some(hit) = traced.hit(Vec3::new(x, y, 1.0), -Vec3::Z) else { continue };
+            assert!(hit.dp_du.is_finite() && hit.dp_dv.is_finite() && hit.uv.is_finite(), "{file}");
+            let frame = hit.frame;
+            assert!(frame.n.is_normalized() && frame.s.is_normalized() && frame.t.is_normalized(), "{file} {frame:?}");
+            assert!(frame.s.dot(frame.n).abs() < 1e-5 && frame.s.cross(frame.t).dot(frame.n) > 0.999, "{file}");
+        }
+    }
+    std::fs::remove_dir_all(&folder).expect("the folder");
+}
