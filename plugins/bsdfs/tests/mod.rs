@@ -63,6 +63,8 @@ fn try_build(lines: &str) -> Result<Arc<dyn Bsdf>, SceneErrors> {
         search_path: Vec::new(),
         notes: Vec::new(),
         warnings: Vec::new(),
+        confined_to: None,
+        file_versions: Vec::new(),
     };
     let mut open: Vec<NodeId> = Vec::new();
     for line in lines.split(['\n', ';']).map(str::trim).filter(|l| !l.is_empty()) {
