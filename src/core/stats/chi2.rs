@@ -164,6 +164,15 @@ impl Cell {
         sum * self.dtheta * self.dphi
     }
 
+    /// Whether a density is zero in a corner but not at the node next to it, or the other way round.
+    fn breaks_off(&self, f: &impl Fn(f64, f64) -> f64) -> bool {
+        let is_zero = |x: f64, y: f64| f(self.theta + x * self.dtheta, self.phi + y * self.dphi) == 0.0;
+        [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0)].into_iter().any(|(x, y)| {
+            let inside = |corner: f64, by: f64| corner + by * (1.0 - 2.0 * corner);
+            is_zero(inside(x, 0.002), inside(y, 0.002)) != is_zero(inside(x, 0.07), inside(y, 0.07))
+        })
+    }
+
     /// Splits until halving the cell changes no more than the tolerance, or the cell is as small as it gets.
     fn integrate(&self, f: &impl Fn(f64, f64) -> f64, coarse: f64, tolerance: f64, depth: u32) -> f64 {
         let mut parts = [(*self, 0.0); 4];
@@ -171,7 +180,8 @@ impl Cell {
             *part = (quarter, quarter.gauss(f));
         }
         let fine: f64 = parts.iter().map(|(_, value)| value).sum();
-        let refine = (fine - coarse).abs() > tolerance; // not for NaN
+        // Not for NaN. A density that breaks off between the outermost nodes and the corners changes nothing yet.
+        let refine = (fine - coarse).abs() > tolerance || self.breaks_off(f);
         if !refine || depth >= Self::MAX_DEPTH {
             return fine;
         }
