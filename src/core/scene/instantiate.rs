@@ -10,6 +10,7 @@ use super::object::{BuiltSensor, BuiltShape, Object};
 use super::properties::Properties;
 use super::registry::{Built, Constructor, Failed, Plugin, Registry};
 use super::world::{EmitterSource, Scene};
+use crate::accel::Geometry;
 use crate::interfaces::{Emitter, EmitterFlags, Shape};
 use rayon::prelude::*;
 use std::cell::{Cell, RefCell};
@@ -365,6 +366,11 @@ impl<'a> Builder<'a> {
                 _ => {}
             }
         }
+        // The reference gathers meshes behind everything else; the numbering decides which random number finds which light.
+        lights.sort_by_key(|light| match light {
+            EmitterSource::Shape(shape) => matches!(shapes[*shape].shape.geometry(), Geometry::Mesh { .. }),
+            EmitterSource::Free(_) => false,
+        });
         match Scene::new(shapes, &lights, sensors, integrator) {
             Ok(scene) => Some(scene),
             Err(message) => {
