@@ -89,11 +89,16 @@ fn resize(description: &mut Description, size: [u32; 2]) {
 
 /// Renders the first sensor.
 pub fn render(scene: &Scene, spp: u32, seed: u32, order: SampleOrder) -> (Image, Report) {
+    render_with(scene, spp, seed, |cx| cx.order = order)
+}
+
+/// Renders the first sensor with changed settings.
+pub fn render_with(scene: &Scene, spp: u32, seed: u32, change: impl FnOnce(&mut RenderContext<'_>)) -> (Image, Report) {
     let control = Control::new();
     let integrator = scene.integrator().expect("an integrator").clone();
     let budget = Budget::Samples(spp);
     let mut cx = RenderContext::new(scene, &scene.sensors()[0], budget, seed, &control, integrator.aov_names());
-    cx.order = order;
+    change(&mut cx);
     let report = integrator.render(&mut cx).expect("a picture");
     let (channels, data) = cx.store.develop(&cx.film);
     let size = cx.store.size();

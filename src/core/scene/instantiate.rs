@@ -366,11 +366,13 @@ impl<'a> Builder<'a> {
                 _ => {}
             }
         }
-        // The reference gathers meshes behind everything else; the numbering decides which random number finds which light.
-        lights.sort_by_key(|light| match light {
+        // The numbering decides which random number finds which light. The reference gathers meshes behind everything
+        // else and lists them backwards (from five on, in an order that changes from run to run).
+        let (meshes, mut lights): (Vec<_>, Vec<_>) = lights.into_iter().partition(|light| match light {
             EmitterSource::Shape(shape) => matches!(shapes[*shape].shape.geometry(), Geometry::Mesh { .. }),
             EmitterSource::Free(_) => false,
         });
+        lights.extend(meshes.into_iter().rev());
         match Scene::new(shapes, &lights, sensors, integrator) {
             Ok(scene) => Some(scene),
             Err(message) => {
