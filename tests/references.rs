@@ -1,0 +1,201 @@
+//! Every test scene against its reference image, statistically.
+//!
+//! Three questions, because each alone is blind to something: do single pixels agree (a wrong texel), do the means of
+//! 8×8 tiles (a wrong region), does the image mean (a wrong factor)? The denominator holds the variance of the
+//! reference, measured from its own passes, and that of our image, measured from ours. The first alone would accept a
+//! bias of 5 to 20 %.
+
+mod support;
+
+use lucerna::core::image::Image;
+use lucerna::core::render::SampleOrder;
+use rayon::prelude::*;
+use support::{Entry, load_entry, manifest, read_exr, render};
+
+/// Our passes, with seeds of their own.
+const PASSES: u32 = 8;
+
+/// Samples per pixel of each pass.
+const SPP: u32 = 32;
+
+/// Share of pixels that must agree at the level of [`SIGNIFICANCE`] with Šidák's correction.
+const PIXELS: f64 = 0.9975;
+
+/// Chance of a false alarm per test of tiles and of the mean.
+const SIGNIFICANCE: f64 = 0.01;
+
+/// Edge of a tile in pixels.
+const TILE: u32 = 8;
+
+/// A relative difference this small is rounding of the stored reference, whatever the noise says.
+const ROUNDING: f64 = 5e-4;
+
+/// Scenes whose reference is not the truth, and why.
+const APART: &[(&str, &str)] = &[];
+
+/// Mean and variance of the mean, per value.
+struct Measured {
+    mean: Vec<f64>,
+    variance: Vec<f64>,
+}
+
+fn measure(passes: &[Vec<f64>]) -> Measured {
+    let n = passes.len() as f64;
+    let values = passes[0].len();
+    let mean: Vec<f64> = (0..values).map(|i| passes.iter().map(|p| p[i]).sum::<f64>() / n).collect();
+    let variance =
+        (0..values).map(|i| passes.iter().map(|p| (p[i] - mean[i]).powi(2)).sum::<f64>() / (n * (n - 1.0))).collect();
+    Measured { mean, variance }
+}
+
+/// Means of whole tiles, one after another per channel.
+fn tile_means(image: &[f64], size: [u32; 2], channels: usize) -> Vec<f64> {
+    let [width, height] = size;
+    let mut means = Vec::new();
+    for ty in 0..(height / TILE).max(1) {
+        for tx in 0..(width / TILE).max(1) {
+            for channel in 0..channels {
+                let (mut sum, mut count) = (0.0, 0.0);
+                for y in ty * TILE..(ty * TILE + TILE).min(height) {
+                    for x in tx * TILE..(tx * TILE + TILE).min(width) {
+                        sum += image[(y * width + x) as usize * channels + channel];
+                        count += 1.0;
+                    }
+                }
+                means.push(sum / count);
+            }
+        }
+    }
+    means
+}
+
+/// Two-sided p-value of Student's t with `freedom` degrees of freedom (Hill 1970, Algorithm 395: normal approximation).
+fn p_value(t: f64, freedom: f64) -> f64 {
+    let y = freedom * (t * t / freedom).ln_1p();
+    let a = freedom - 0.5;
+    let b = 48.0 * a * a;
+    let y = y * a / freedom;
+    let z =
+        y.sqrt() * (1.0 + (((-0.4 * y - 3.3) * y - 24.0) * y - 85.5) / (0.8 * y * y + 100.0 + b) / b + (y + 3.0) / b);
+    let normal = libm_erfc(z / std::f64::consts::SQRT_2);
+    normal.clamp(0.0, 1.0)
+}
+
+/// Complementary error function to 1.2e-7 relative (Press et al. 1992, section 6.2: Chebyshev fit).
+fn libm_erfc(x: f64) -> f64 {
+    const C: [f64; 10] = [
+        -1.26551223,
+        1.00002368,
+        0.37409196,
+        0.09678418,
+        -0.18628806,
+        0.27886807,
+        -1.13520398,
+        1.48851587,
+        -0.82215223,
+        0.17087277,
+    ];
+    let t = 1.0 / (1.0 + 0.5 * x.abs());
+    let polynomial = C.iter().rev().fold(0.0, |sum, c| sum * t + c);
+    let value = t * (-x * x + polynomial).exp();
+    if x >= 0.0 { value } else { 2.0 - value }
+}
+
+/// What a comparison found.
+struct Verdict {
+    pixels: f64,
+    worst_tile: f64,
+    mean: f64,
+    ratio: f64,
+}
+
+fn compare(entry: &Entry) -> Result<Verdict, String> {
+    let scene = load_entry(entry);
+    let reference = read_exr(&format!("reference/images/{}.exr", entry.name));
+    let variance = read_exr(&format!("reference/images/{}.var.exr", entry.name));
+    let images: Vec<Image> = (0..PASSES).map(|i| render(&scene, SPP, 1000 + i, SampleOrder::PerSample).0).collect();
+    let ours = &images[0];
+    if [ours.width, ours.height] != [reference.width, reference.height] {
+        return Err(format!("sizes differ: {}x{}", ours.width, ours.height));
+    }
+    let missing: Vec<&String> = reference.channels.iter().filter(|c| ours.channel(c).is_none()).collect();
+    if !missing.is_empty() {
+        return Err(format!("channels {missing:?} are missing"));
+    }
+    let order: Vec<usize> = reference.channels.iter().filter_map(|c| ours.channel(c)).collect();
+    let pick = |image: &Image| -> Vec<f64> {
+        let stride = image.channels.len();
+        image.data.chunks_exact(stride).flat_map(|p| order.iter().map(|&c| f64::from(p[c]))).collect()
+    };
+    let passes: Vec<Vec<f64>> = images.iter().map(pick).collect();
+    let mine = measure(&passes);
+    let theirs: Vec<f64> = reference.data.iter().map(|v| f64::from(*v)).collect();
+    let their_variance: Vec<f64> = variance.data.iter().map(|v| f64::from(*v)).collect();
+    let channels = order.len();
+    let size = [ours.width, ours.height];
+
+    // Our samples are fewer than the reference's by this factor: where one side saw no variance, the other's counts.
+    let fewer = f64::from(entry.spp * entry.passes) / f64::from(SPP * PASSES);
+    let scale = theirs.iter().map(|v| v.abs()).sum::<f64>() / theirs.len() as f64;
+    let freedom = f64::from(PASSES - 1) + f64::from(entry.passes - 1);
+
+    let test = |a: f64, b: f64, va: f64, vb: f64| {
+        let variance = va.max(vb * fewer) + vb.max(va / fewer);
+        let rounding = ROUNDING * (b.abs() + 0.01 * scale);
+        let excess = ((a - b).abs() - rounding).max(0.0);
+        if excess == 0.0 { 1.0 } else { p_value(excess / variance.sqrt().max(1e-30), freedom) }
+    };
+    let sidak = |level: f64, n: usize| 1.0 - (1.0 - level).powf(1.0 / n.max(1) as f64);
+
+    let values = theirs.len();
+    let bound = sidak(SIGNIFICANCE, values);
+    let good =
+        (0..values).filter(|&i| test(mine.mean[i], theirs[i], mine.variance[i], their_variance[i]) >= bound).count();
+
+    // Means over tiles: neighbours share samples under wide filters, so their variance is taken from whole passes.
+    let tiles = measure(&passes.iter().map(|p| tile_means(p, size, channels)).collect::<Vec<_>>());
+    let their_tiles = tile_means(&theirs, size, channels);
+    let worst_tile = (0..their_tiles.len())
+        .map(|i| test(tiles.mean[i], their_tiles[i], tiles.variance[i], tiles.variance[i] / fewer))
+        .fold(1.0, f64::min);
+    let tile_bound = sidak(SIGNIFICANCE, their_tiles.len());
+
+    let total = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+    let mean = measure(&passes.iter().map(|p| vec![total(p)]).collect::<Vec<_>>());
+    let their_mean = total(&theirs);
+    let p_mean = test(mean.mean[0], their_mean, mean.variance[0], mean.variance[0] / fewer);
+
+    let verdict = Verdict {
+        pixels: good as f64 / values as f64,
+        worst_tile: worst_tile / tile_bound,
+        mean: p_mean / SIGNIFICANCE,
+        ratio: mean.mean[0] / their_mean,
+    };
+    let line = format!(
+        "{:<40} pixels {:.4}, worst tile p/bound {:.1e}, mean p/bound {:.1e}, ratio {:.5}",
+        entry.name, verdict.pixels, verdict.worst_tile, verdict.mean, verdict.ratio
+    );
+    if verdict.pixels >= PIXELS && verdict.worst_tile >= 1.0 && verdict.mean >= 1.0 { Ok(verdict) } else { Err(line) }
+}
+
+#[test]
+fn test_scenes_agree_with_their_references() {
+    let only = std::env::var("LUCERNA_ONLY").unwrap_or_default();
+    let apart = |name: &str| APART.iter().any(|(apart, _)| name.starts_with(apart));
+    let entries: Vec<Entry> =
+        manifest("image").into_iter().filter(|e| e.name.contains(&only) && !apart(&e.name)).collect();
+    let results: Vec<Result<Verdict, String>> = entries
+        .par_iter()
+        .map(|entry| {
+            std::panic::catch_unwind(|| compare(entry))
+                .unwrap_or_else(|_| Err(format!("{:<40} panicked", entry.name)))
+                .map_err(|line| if line.starts_with(&entry.name) { line } else { format!("{:<40} {line}", entry.name) })
+        })
+        .collect();
+    let failed: Vec<&String> = results.iter().filter_map(|r| r.as_ref().err()).collect();
+    println!("{} scenes agree, {} are left apart", results.len() - failed.len(), APART.len());
+    let list: Vec<&str> = failed.iter().map(|s| s.as_str()).collect();
+    // The mean and tiles of 250 scenes are tested at 1 % each: some fail by chance, none twice. Those get another look
+    // with other seeds by `LUCERNA_ONLY=name`; here more than chance allows is a failure.
+    assert!(list.is_empty(), "{} of {} scenes differ:\n{}", list.len(), results.len(), list.join("\n"));
+}
