@@ -81,6 +81,8 @@ impl Run<'_, '_> {
             if start >= end || (pass > 0 && cx.control.should_stop()) {
                 break;
             }
+            // A pass that is cut short is lost, so that the picture is that of so many samples; but for the first one.
+            let before = (report.spp > 0).then(|| store.clone());
             let mut complete = true;
             for batch in tiles.chunks(BATCH) {
                 let results: Vec<TileResult> = batch
@@ -101,6 +103,7 @@ impl Run<'_, '_> {
                 }
             }
             if !complete {
+                store = before.unwrap_or(store);
                 break;
             }
             report.spp = end;
