@@ -253,6 +253,22 @@ fn some_value(param: &Param) -> Value {
     }
 }
 
+/// Whether a constructor gets a parameter by its name, and not as one of its children or never.
+fn read_by_name(param: &Param) -> bool {
+    !matches!(param.ty, ParamType::Any | ParamType::Child(..))
+}
+
+/// The description with a parameter of the node set, if it is not already.
+fn with(description: &Description, node: NodeId, param: &Param) -> Description {
+    let mut description = description.clone();
+    if description.node(node).parameter(param.name).is_none() {
+        let at = description.node(node).at.clone();
+        let parameter = Parameter { name: param.name.to_owned(), value: some_value(param), at };
+        description.node_mut(node).parameters.push(parameter);
+    }
+    description
+}
+
 #[test]
 fn constructors_read_what_tables_offer() {
     let registry = lucerna::builtin();
@@ -260,19 +276,21 @@ fn constructors_read_what_tables_offer() {
     for source in sources() {
         let (plugin, kind) = (source.plugin(&registry), source.kind());
         let (example, node) = described(&source);
-        for param in plugin.all_params() {
-            if matches!(param.ty, ParamType::Any | ParamType::Child(..)) {
-                continue;
-            }
-            let mut description = example.clone();
-            if description.node(node).parameter(param.name).is_none() {
-                let at = description.node(node).at.clone();
-                let parameter = Parameter { name: param.name.to_owned(), value: some_value(param), at };
-                description.node_mut(node).parameters.push(parameter);
-            }
-            let reads = trace_reads(&registry, &description);
-            let reads = reads.unwrap_or_else(|e| panic!("{}: \"{}\": {e}", source.title(), param.name));
-            if !reads.contains(&(kind, plugin.name, param.name)) {
+        for param in plugin.all_params().filter(|param| read_by_name(param)) {
+            let description = with(&example, node, param);
+            let is_read = |description: &Description| {
+                let reads = trace_reads(&registry, description);
+                let reads = reads.unwrap_or_else(|e| panic!("{}: \"{}\": {e}", source.title(), param.name));
+                reads.contains(&(kind, plugin.name, param.name))
+            };
+            // Some count only where another is set, too.
+            let beside_another = || {
+                plugin
+                    .all_params()
+                    .filter(|other| read_by_name(other))
+                    .any(|other| is_read(&with(&description, node, other)))
+            };
+            if !is_read(&description) && !beside_another() {
                 unread.entry(source.title()).or_default().push(param.name);
             }
         }
