@@ -184,12 +184,16 @@ fn statistics_are_written_in_json() {
 
 #[test]
 fn bad_samples_can_fail_a_run() {
-    // So near to the plane that its light overflows 32-bit numbers.
+    // What the lamp gives off and what it reflects are both near the largest 32-bit number; the sum is not finite.
     let scene = "<scene version='3.0.0'><integrator type='direct'/>
         <sensor type='perspective'><film type='hdrfilm'><integer name='width' value='8'/>
             <integer name='height' value='8'/><rfilter type='box'/></film></sensor>
-        <shape type='rectangle'><transform name='to_world'><rotate y='1' angle='180'/><translate z='1'/></transform></shape>
-        <emitter type='point'><point name='position' x='0' y='0' z='0.9'/><float name='intensity' value='3e38'/></emitter>
+        <emitter type='constant'><float name='radiance' value='3e38'/></emitter>
+        <shape type='rectangle'>
+            <transform name='to_world'><rotate y='1' angle='180'/><translate z='3'/></transform>
+            <bsdf type='diffuse'><float name='reflectance' value='1'/></bsdf>
+            <emitter type='area'><float name='radiance' value='3e38'/></emitter>
+        </shape>
     </scene>";
     let file = temporary("bad", "bright.xml");
     std::fs::write(&file, scene).expect("a file");
