@@ -2,7 +2,8 @@
 //!
 //! At each vertex one light is sampled and one direction of the BSDF; where both could have found the same light they
 //! are combined by multiple importance sampling (Kajiya 1986; Veach 1997, chapter 9). Paths end by depth or by Russian
-//! roulette on the throughput. Surfaces only; `volpath` also looks through index-matched surfaces on the way to a light.
+//! roulette on the throughput. A sample that met nothing but surfaces that let it straight through, and no environment,
+//! is transparent: alpha 0 and, as in the reference, no colour. Surfaces only; `volpath` also looks through index-matched surfaces on the way to a light.
 //!
 //! | parameter | type | default | meaning |
 //! |---|---|---|---|
@@ -84,6 +85,9 @@ impl RadianceEstimator for Path {
             }
             let Some(hit) = hit else { break };
             if depth + 1 >= max_depth {
+                if depth == 0 && !found.rgb.is_black() {
+                    found.alpha = 1.0;
+                }
                 break;
             }
             let bsdf = scene.bsdf(&hit);
@@ -121,6 +125,9 @@ impl RadianceEstimator for Path {
                 }
                 throughput *= 1.0 / q;
             }
+        }
+        if found.alpha == 0.0 {
+            found.rgb = Rgb::BLACK;
         }
         found
     }

@@ -18,18 +18,19 @@ pub struct ReferenceOrder {
 }
 
 impl ReferenceOrder {
-    /// For an image of `size` pixels (the crop window), rendered by the reference with so many threads (workers + 1).
-    pub fn new(size: UVec2, seed: u32, threads: u32) -> Self {
+    /// For an image of `size` pixels (the sampled window), rendered by the reference with so many threads
+    /// (workers + 1). `offset` is the sampler's own seed.
+    pub fn new(size: UVec2, seed: u32, offset: u32, threads: u32) -> Self {
         let mut block_edge = 32;
         while block_edge > 1 && size.x.div_ceil(block_edge) * size.y.div_ceil(block_edge) < threads {
             block_edge /= 2;
         }
         let blocks = UVec2::new(size.x.div_ceil(block_edge), size.y.div_ceil(block_edge));
-        let base = seed.wrapping_mul(size.x.wrapping_mul(size.y));
+        let base = seed.wrapping_mul(size.x.wrapping_mul(size.y)).wrapping_add(offset);
         ReferenceOrder { size, block_edge, block_ids: spiral(blocks), blocks, base }
     }
 
-    /// The generator of a pixel, given relative to the crop window.
+    /// The generator of a pixel, given relative to the sampled window.
     pub fn generator(&self, pixel: UVec2) -> Pcg32 {
         debug_assert!(pixel.x < self.size.x && pixel.y < self.size.y);
         let block = pixel / self.block_edge;

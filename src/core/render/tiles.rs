@@ -142,7 +142,11 @@ impl Run<'_, '_> {
         let cx = self.cx;
         let reference = match cx.order {
             SampleOrder::PerSample => None,
-            SampleOrder::Reference { threads } => Some(ReferenceOrder::new(cx.film.crop_size, cx.seed, threads)),
+            SampleOrder::Reference { threads } => {
+                let offset = cx.sampler.seed();
+                let size = cx.film.crop_size + 2 * cx.border();
+                Some(ReferenceOrder::new(size, cx.seed.wrapping_sub(offset), offset, threads))
+            }
         };
         let mut result = TileResult {
             store: TileStore::new(tile, &*cx.film.filter, cx.store.aovs().len()),
@@ -165,7 +169,10 @@ impl Run<'_, '_> {
                 let pixel = crop + inside;
                 // Border pixels may have negative coordinates; the key wraps them to large ones.
                 let key = UVec2::new(pixel.x as u32, pixel.y as u32);
-                let mut shared = reference.as_ref().map(|r| Stream::independent(r.generator(inside.as_uvec2())));
+                let mut shared = reference.as_ref().map(|r| {
+                    let sampled = (inside + IVec2::splat(cx.border() as i32)).as_uvec2();
+                    Stream::independent(r.generator(sampled))
+                });
                 for sample in start..end {
                     aovs.fill(0.0);
                     let (offset, value) = match &mut shared {

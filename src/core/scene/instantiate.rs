@@ -10,6 +10,7 @@ use super::object::{BuiltSensor, BuiltShape, Object};
 use super::properties::{Properties, Reads, Trace};
 use super::registry::{Built, Constructor, Failed, Plugin, Registry};
 use super::world::{EmitterSource, Scene};
+use crate::accel::Geometry;
 use crate::interfaces::{Emitter, EmitterFlags, Shape};
 use rayon::prelude::*;
 use std::cell::{Cell, RefCell};
@@ -391,6 +392,13 @@ impl<'a> Builder<'a> {
                 _ => {}
             }
         }
+        // The numbering decides which random number finds which light. The reference gathers meshes behind everything
+        // else and lists them backwards (from five on, in an order that changes from run to run).
+        let (meshes, mut lights): (Vec<_>, Vec<_>) = lights.into_iter().partition(|light| match light {
+            EmitterSource::Shape(shape) => matches!(shapes[*shape].shape.geometry(), Geometry::Mesh { .. }),
+            EmitterSource::Free(_) => false,
+        });
+        lights.extend(meshes.into_iter().rev());
         match Scene::new(shapes, &lights, sensors, integrator) {
             Ok(scene) => Some(scene),
             Err(message) => {
