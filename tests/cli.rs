@@ -166,6 +166,16 @@ fn a_time_limit_gives_the_picture_of_so_many_samples() {
 }
 
 #[test]
+fn a_scene_may_set_a_time_limit() {
+    let arguments = ["--spp", "1000000", "--integrator", "path:timeout=0.2,max_depth=3"];
+    let timed = cornell("timeout", "timed.exr", &arguments);
+    let spp = number(&timed, "lucerna:spp").to_string();
+    assert!(number(&timed, "lucerna:seconds") < 2.0, "stops soon");
+    let counted = cornell("timeout", "counted.exr", &["--spp", &spp, "--integrator", "path:max_depth=3"]);
+    assert_eq!(timed.image.data, counted.image.data, "{spp} spp");
+}
+
+#[test]
 fn statistics_are_written_in_json() {
     let stats = temporary("stats", "stats.json");
     cornell("stats", "box.exr", &["--spp", "2", "--stats-json", text(&stats)]);
@@ -187,7 +197,8 @@ fn bad_samples_can_fail_a_run() {
     // What the lamp gives off and what it reflects are both near the largest 32-bit number; the sum is not finite.
     let scene = "<scene version='3.0.0'><integrator type='direct'/>
         <sensor type='perspective'><film type='hdrfilm'><integer name='width' value='8'/>
-            <integer name='height' value='8'/><rfilter type='box'/></film></sensor>
+            <integer name='height' value='8'/><string name='component_format' value='float32'/>
+            <rfilter type='box'/></film></sensor>
         <emitter type='constant'><float name='radiance' value='3e38'/></emitter>
         <shape type='rectangle'>
             <transform name='to_world'><rotate y='1' angle='180'/><translate z='3'/></transform>

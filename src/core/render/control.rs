@@ -79,9 +79,14 @@ impl<'a> Control<'a> {
         self.stop.store(true, Ordering::Relaxed);
     }
 
-    /// Whether the run should end.
+    /// Whether [`stop`](Self::stop) was called.
+    pub fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    /// Whether the run should end: it was stopped, or the deadline has passed.
     pub fn should_stop(&self) -> bool {
-        self.stop.load(Ordering::Relaxed) || self.deadline.is_some_and(|d| Instant::now() >= d)
+        self.is_stopped() || self.deadline.is_some_and(|d| Instant::now() >= d)
     }
 
     /// Seconds since the start.

@@ -161,7 +161,8 @@ impl Run<'_, '_> {
         for y in 0..tile.size.y {
             for x in 0..tile.size.x {
                 // The first pass is finished in any case, so that every pixel has a sample, unless the user insists.
-                if cx.control.should_stop() && (complete_spp > 0 || matches!(cx.budget, Budget::Samples(_))) {
+                let stop = if complete_spp > 0 { cx.control.should_stop() } else { cx.control.is_stopped() };
+                if stop {
                     result.complete = false;
                     return result;
                 }
