@@ -61,6 +61,10 @@ pub struct Arguments {
     #[arg(long, value_name = "X,Y,W,H", value_parser = numbers::<4>)]
     crop: Option<[u32; 4]>,
 
+    /// Another picture size, as WIDTHxHEIGHT; a crop window in the scene is dropped
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    size: Option<[u32; 2]>,
+
     /// Replay one sample of this pixel and print its value
     #[arg(long, value_name = "X,Y", value_parser = numbers::<2>)]
     pixel: Option<[u32; 2]>,
@@ -102,6 +106,10 @@ fn numbers<const N: usize>(text: &str) -> Result<[u32; N], String> {
     list.ok().and_then(|list| list.try_into().ok()).ok_or_else(|| format!("expected {N} whole numbers"))
 }
 
+fn size(text: &str) -> Result<[u32; 2], String> {
+    numbers(&text.replace('x', ","))
+}
+
 /// Ctrl-C asks the running render to stop; the second one ends the program.
 fn stop_on_interrupt(control: &'static Control<'static>) {
     let mut pressed = false;
@@ -129,6 +137,9 @@ pub fn run(registry: &Registry, arguments: &Arguments) -> Result<ExitCode, Failu
     let mut description = arguments.scene.describe()?;
     if let Some(text) = &arguments.integrator {
         replace_child(&mut description, ObjectKind::Integrator, text)?;
+    }
+    if let Some(size) = arguments.size {
+        resize(&mut description, size);
     }
     let mut scene = arguments.scene.build(registry, description)?.scene;
     if arguments.reference_order.is_some() {
@@ -343,6 +354,19 @@ fn peak_memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
     line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib >> 10)
+}
+
+/// Gives every film another size.
+fn resize(description: &mut Description, size: [u32; 2]) {
+    for node in description.nodes.iter_mut().filter(|node| node.kind == ObjectKind::Film) {
+        for name in ["width", "height", "crop_width", "crop_height", "crop_offset_x", "crop_offset_y"] {
+            node.take(name);
+        }
+        for (name, value) in [("width", size[0]), ("height", size[1])] {
+            let (name, at) = (name.to_owned(), Location::file("--size"));
+            node.parameters.push(Parameter { name, value: Value::Integer(value.into()), at });
+        }
+    }
 }
 
 /// Puts an object from the command line in the place of the scene's own.

@@ -288,7 +288,8 @@ fn mismatch(spec: &Param, value: &Value) -> Option<String> {
             Slot::Reflectance if components.iter().any(|v| !(0.0..=1.0).contains(v)) => {
                 Some(format!("\"{name}\" is a reflectance and must be in [0, 1], got {}", join(&components)))
             }
-            _ if components.iter().any(|v| *v < 0.0) => {
+            // Indices of refraction fitted to RGB may be negative in a channel; real scenes have such metals.
+            Slot::Emissive if components.iter().any(|v| *v < 0.0) => {
                 Some(format!("\"{name}\" must not be negative, got {}", join(&components)))
             }
             _ => None,
