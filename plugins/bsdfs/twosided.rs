@@ -39,7 +39,8 @@ fn build(p: &Properties<'_>) -> Built<dyn Bsdf> {
         return Err(p.error("bsdf", "a nested one-sided material is required"));
     };
     let back = nested.next().unwrap_or_else(|| front.clone());
-    if (front.lobes() | back.lobes()).intersects(Lobes::TRANSMISSION) && !p.bool("allow_transmission") {
+    let allow_transmission = p.bool("allow_transmission");
+    if (front.lobes() | back.lobes()).intersects(Lobes::TRANSMISSION) && !allow_transmission {
         return Err(p.error(
             "bsdf",
             "only materials without a transmission component can be nested (set \"allow_transmission\" to true to \

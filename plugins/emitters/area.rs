@@ -7,6 +7,7 @@
 //! | parameter | type | default | meaning |
 //! |---|---|---|---|
 //! | `radiance` | colour or texture | 1 | radiance in W·m⁻²·sr⁻¹ |
+//! | `to_world` | transform | identity | an error: the light is where its shape is |
 //! | `sampling_weight` | float | 1 | relative chance of being sampled for direct light |
 //!
 //! ```xml

@@ -18,7 +18,7 @@
 //! </integrator>
 //! ```
 
-use super::common::COMMON;
+use super::common::{COMMON, HIDE_IGNORED, timeout};
 use lucerna_core::accel::Ray;
 use lucerna_core::interfaces::{Arena, Integrator, Radiance, RadianceEstimator, SurfaceHit};
 use lucerna_core::render::{RenderContext, RenderError, Report, render_estimator};
@@ -33,6 +33,7 @@ pub const PLUGIN: Plugin = Plugin {
     summary: "properties of the visible surface as extra channels",
     params: &[
         COMMON,
+        HIDE_IGNORED,
         &[
             Param::string_opt("aovs", "list of name:type").required(),
             Param::child(ObjectKind::Integrator, 0, usize::MAX, "integrators whose images come first"),
@@ -104,7 +105,7 @@ fn build(p: &Properties<'_>) -> Built<dyn Integrator> {
         kinds.push(*kind);
         names.extend(channels.iter().map(|c| format!("{name}.{c}")));
     }
-    Ok(Arc::new(Aov { nested, kinds, names }))
+    Ok(Arc::new(Aov { nested, kinds, names, timeout: timeout(p) }))
 }
 
 struct Aov {
@@ -112,6 +113,7 @@ struct Aov {
     nested: Vec<(Arc<dyn Integrator>, usize)>,
     kinds: Vec<Kind>,
     names: Vec<String>,
+    timeout: Option<f64>,
 }
 
 impl Integrator for Aov {
@@ -121,6 +123,10 @@ impl Integrator for Aov {
 
     fn aov_names(&self) -> Vec<String> {
         self.names.clone()
+    }
+
+    fn timeout(&self) -> Option<f64> {
+        self.timeout
     }
 
     fn estimator(&self) -> Option<&dyn RadianceEstimator> {

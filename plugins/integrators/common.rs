@@ -8,17 +8,28 @@ use lucerna_core::scene::{EmitterId, Param, Properties, Scene};
 
 /// Parameters of every integrator.
 pub const COMMON: &[Param] = &[
-    Param::float("timeout", -1.0, "seconds after which rendering stops; negative: never (see also --seconds)"),
-    Param::bool("hide_emitters", false, "lights are not seen directly"),
+    Param::float("timeout", -1.0, "seconds after which rendering stops; negative or 0: never (see also --seconds)"),
     Param::ignored("block_size", "hint for the reference renderer"),
     Param::ignored("samples_per_pass", "hint for the reference renderer"),
 ];
 
+/// A parameter of integrators that gather light.
+pub const HIDE: Param = Param::bool("hide_emitters", false, "lights are not seen directly");
+
+/// The same parameter where it means nothing.
+pub const HIDE_IGNORED: &[Param] = &[Param::ignored("hide_emitters", "of no effect: no light is gathered here")];
+
 /// Parameters of integrators that follow paths.
 pub const PATH: &[Param] = &[
+    HIDE,
     Param::int("max_depth", -1, "longest path: 1 sees lights only, 2 direct light, -1 no limit").at_least(-1.0),
     Param::int("rr_depth", 5, "depth from which Russian roulette may end a path").at_least(1.0),
 ];
+
+/// Seconds after which the scene wants rendering to stop, from [`COMMON`].
+pub fn timeout(p: &Properties<'_>) -> Option<f64> {
+    Some(p.double("timeout")).filter(|seconds| *seconds > 0.0)
+}
 
 /// How long paths get.
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +43,7 @@ pub struct PathLimits {
 }
 
 impl PathLimits {
-    /// From [`COMMON`] and [`PATH`].
+    /// From [`PATH`].
     pub fn new(p: &Properties<'_>) -> Self {
         let number = |name: &str| u32::try_from(p.int(name)).unwrap_or(u32::MAX);
         PathLimits {
@@ -113,7 +124,8 @@ pub fn first_hit_without_light(scene: &Scene, ray: &Ray, rays: &mut u32) -> Opti
     }
 }
 
-/// Replaces the estimator-independent part of a plugin: an integrator that is a plain forward estimator.
+/// Replaces the estimator-independent part of a plugin: an integrator that is a plain forward estimator, with a field
+/// `timeout`.
 macro_rules! forward_integrator {
     ($type:ty) => {
         impl lucerna_core::interfaces::Integrator for $type {
@@ -122,6 +134,10 @@ macro_rules! forward_integrator {
                 cx: &mut lucerna_core::render::RenderContext<'_>,
             ) -> Result<lucerna_core::render::Report, lucerna_core::render::RenderError> {
                 lucerna_core::render::render_estimator(cx, self)
+            }
+
+            fn timeout(&self) -> Option<f64> {
+                self.timeout
             }
 
             fn estimator(&self) -> Option<&dyn lucerna_core::interfaces::RadianceEstimator> {

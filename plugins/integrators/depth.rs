@@ -7,7 +7,7 @@
 //! <integrator type="depth"/>
 //! ```
 
-use super::common::{COMMON, forward_integrator};
+use super::common::{COMMON, HIDE_IGNORED, forward_integrator, timeout};
 use lucerna_core::accel::Ray;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{Arena, Integrator, Radiance, RadianceEstimator};
@@ -20,15 +20,17 @@ pub const PLUGIN: Plugin = Plugin {
     name: "depth",
     aliases: &[],
     summary: "distance to the first hit",
-    params: &[COMMON],
+    params: &[COMMON, HIDE_IGNORED],
     build: Constructor::Integrator(build),
 };
 
-fn build(_: &Properties<'_>) -> Built<dyn Integrator> {
-    Ok(Arc::new(Depth))
+fn build(p: &Properties<'_>) -> Built<dyn Integrator> {
+    Ok(Arc::new(Depth { timeout: timeout(p) }))
 }
 
-struct Depth;
+struct Depth {
+    timeout: Option<f64>,
+}
 
 forward_integrator!(Depth);
 

@@ -17,7 +17,7 @@
 //! </integrator>
 //! ```
 
-use super::common::{COMMON, emission, first_hit_without_light, forward_integrator, mis_weight};
+use super::common::{COMMON, HIDE, emission, first_hit_without_light, forward_integrator, mis_weight, timeout};
 use lucerna_core::accel::Ray;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{Arena, Integrator, LightPoint, Lobes, Radiance, RadianceEstimator, Transport};
@@ -33,7 +33,8 @@ pub const PLUGIN: Plugin = Plugin {
     params: &[
         COMMON,
         &[
-            Param::int_opt("shading_samples", "sets both counts below").range(1.0, MOST),
+            HIDE,
+            Param::int("shading_samples", 1, "sets both counts below").range(1.0, MOST),
             Param::int_opt("emitter_samples", "emitter samples per pixel sample").range(0.0, MOST),
             Param::int_opt("bsdf_samples", "BSDF samples per pixel sample").range(0.0, MOST),
         ],
@@ -47,16 +48,17 @@ const MOST: f64 = 65536.0;
 fn build(p: &Properties<'_>) -> Built<dyn Integrator> {
     p.exclusive("shading_samples", "emitter_samples")?;
     p.exclusive("shading_samples", "bsdf_samples")?;
-    let shading = p.int_opt("shading_samples").unwrap_or(1);
+    let shading = p.int("shading_samples");
     let count = |name: &str| p.int_opt(name).unwrap_or(shading) as u32;
     let (emitter_samples, bsdf_samples) = (count("emitter_samples"), count("bsdf_samples"));
     if emitter_samples + bsdf_samples == 0 {
         return Err(p.error("bsdf_samples", "\"emitter_samples\" and \"bsdf_samples\" cannot both be 0"));
     }
-    Ok(Arc::new(Direct { emitter_samples, bsdf_samples, hide_emitters: p.bool("hide_emitters") }))
+    Ok(Arc::new(Direct { emitter_samples, bsdf_samples, hide_emitters: p.bool("hide_emitters"), timeout: timeout(p) }))
 }
 
 struct Direct {
+    timeout: Option<f64>,
     emitter_samples: u32,
     bsdf_samples: u32,
     hide_emitters: bool,

@@ -9,7 +9,7 @@
 //! </integrator>
 //! ```
 
-use super::common::COMMON;
+use super::common::{COMMON, HIDE_IGNORED, timeout};
 use lucerna_core::accel::Ray;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{Arena, Integrator, Radiance, RadianceEstimator};
@@ -23,7 +23,7 @@ pub const PLUGIN: Plugin = Plugin {
     name: "moment",
     aliases: &[],
     summary: "nested integrators and their second moments",
-    params: &[COMMON, &[Param::child(ObjectKind::Integrator, 1, usize::MAX, "what is measured")]],
+    params: &[COMMON, HIDE_IGNORED, &[Param::child(ObjectKind::Integrator, 1, usize::MAX, "what is measured")]],
     build: Constructor::Integrator(build),
 };
 
@@ -41,13 +41,14 @@ fn build(p: &Properties<'_>) -> Built<dyn Integrator> {
     }
     let squares: Vec<String> = names.iter().map(|n| format!("m2_{n}")).collect();
     names.extend(squares);
-    Ok(Arc::new(Moment { nested, names }))
+    Ok(Arc::new(Moment { nested, names, timeout: timeout(p) }))
 }
 
 struct Moment {
     /// Integrators with the number of their own extra channels.
     nested: Vec<(Arc<dyn Integrator>, usize)>,
     names: Vec<String>,
+    timeout: Option<f64>,
 }
 
 impl Integrator for Moment {
@@ -57,6 +58,10 @@ impl Integrator for Moment {
 
     fn aov_names(&self) -> Vec<String> {
         self.names.clone()
+    }
+
+    fn timeout(&self) -> Option<f64> {
+        self.timeout
     }
 
     fn estimator(&self) -> Option<&dyn RadianceEstimator> {

@@ -18,7 +18,7 @@
 //! ```
 
 use super::common::{
-    COMMON, PATH, PathLimits, Scattered, first_hit_without_light, forward_integrator, mis_weight, survival,
+    COMMON, PATH, PathLimits, Scattered, first_hit_without_light, forward_integrator, mis_weight, survival, timeout,
     weighted_emission,
 };
 use lucerna_core::accel::Ray;
@@ -40,11 +40,12 @@ pub const PLUGIN: Plugin = Plugin {
 };
 
 fn build(p: &Properties<'_>) -> Built<dyn Integrator> {
-    Ok(Arc::new(Path { limits: PathLimits::new(p) }))
+    Ok(Arc::new(Path { limits: PathLimits::new(p), timeout: timeout(p) }))
 }
 
 struct Path {
     limits: PathLimits,
+    timeout: Option<f64>,
 }
 
 forward_integrator!(Path);

@@ -17,7 +17,9 @@
 //! </integrator>
 //! ```
 
-use super::common::{COMMON, PATH, PathLimits, Scattered, forward_integrator, mis_weight, survival, weighted_emission};
+use super::common::{
+    COMMON, PATH, PathLimits, Scattered, forward_integrator, mis_weight, survival, timeout, weighted_emission,
+};
 use lucerna_core::accel::Ray;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{
@@ -46,11 +48,12 @@ const MOST_PASSED: u32 = 4096;
 /// The estimator, shared with `volpathmis`.
 pub(super) struct VolPath {
     limits: PathLimits,
+    timeout: Option<f64>,
 }
 
 impl VolPath {
     pub(super) fn new(p: &Properties<'_>) -> Self {
-        VolPath { limits: PathLimits::new(p) }
+        VolPath { limits: PathLimits::new(p), timeout: timeout(p) }
     }
 }
 

@@ -4,8 +4,8 @@
 //!
 //! | parameter | type | default | meaning |
 //! |---|---|---|---|
-//! | `max_depth`, `rr_depth`, `hide_emitters` | | | as `volpath` |
-//! | `use_spectral_mis` | boolean | true | combine the densities of all colour channels inside media |
+//! | `max_depth`, `rr_depth`, `hide_emitters` | | -1, 5, false | as `volpath` |
+//! | `use_spectral_mis` | anything | | accepted, without effect as long as there are no media |
 //!
 //! ```xml
 //! <integrator type="volpathmis">
@@ -24,7 +24,7 @@ pub const PLUGIN: Plugin = Plugin {
     name: "volpathmis",
     aliases: &[],
     summary: "as volpath, with spectral multiple importance sampling inside media",
-    params: &[COMMON, PATH, &[Param::bool("use_spectral_mis", true, "combine all channels inside media")]],
+    params: &[COMMON, PATH, &[Param::ignored("use_spectral_mis", "of no effect without media")]],
     build: Constructor::Integrator(build),
 };
 

@@ -33,6 +33,9 @@ const COMMON: &[Param] = &[
 const FOCUS: Param = Param::float_opt("focus_distance", "distance of the plane in focus; by default `far_clip`")
     .between(0.0, f64::INFINITY);
 
+/// The same where everything is in focus.
+const FOCUS_IGNORED: Param = Param::ignored("focus_distance", "of no effect: everything is in focus");
+
 /// How a lens draws: the angle of view.
 const VIEW: &[Param] = &[
     Param::float_opt("fov", "angle of view in degrees, along `fov_axis`").between(0.0, 180.0),

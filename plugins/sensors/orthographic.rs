@@ -16,7 +16,7 @@
 //! </sensor>
 //! ```
 
-use super::{COMMON, Camera, FOCUS};
+use super::{COMMON, Camera, FOCUS_IGNORED};
 use lucerna_core::accel::Ray;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{CameraRay, Sensor};
@@ -29,7 +29,7 @@ pub const PLUGIN: Plugin = Plugin {
     name: "orthographic",
     aliases: &[],
     summary: "camera with parallel rays",
-    params: &[COMMON, &[FOCUS]],
+    params: &[COMMON, &[FOCUS_IGNORED]],
     build: Constructor::Sensor(build),
 };
 

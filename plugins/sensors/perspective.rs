@@ -5,7 +5,7 @@
 //!
 //! | parameter | type | default | meaning |
 //! |---|---|---|---|
-//! | `fov` | float | | angle of view in degrees, between 0 and 180 |
+//! | `fov` | float | unset | angle of view in degrees, between 0 and 180 |
 //! | `focal_length` | string | 50mm | as on 35 mm film, for the diagonal; instead of `fov` |
 //! | `fov_axis` | x, y, diagonal, smaller, larger | x | which angle `fov` is |
 //! | `principal_point_offset_x`, `principal_point_offset_y` | float | 0 | shifts the picture, in sizes of the film |
@@ -21,7 +21,7 @@
 //! </sensor>
 //! ```
 
-use super::{COMMON, Camera, FOCUS, VIEW, half_width};
+use super::{COMMON, Camera, FOCUS_IGNORED, VIEW, half_width};
 use lucerna_core::interfaces::{CameraRay, Sensor};
 use lucerna_core::math::{Vec2, Vec3};
 use lucerna_core::scene::{Built, Constructor, Param, Plugin, Properties};
@@ -36,7 +36,7 @@ pub const PLUGIN: Plugin = Plugin {
         COMMON,
         VIEW,
         &[
-            FOCUS,
+            FOCUS_IGNORED,
             Param::float("principal_point_offset_x", 0.0, "shift of the picture in widths"),
             Param::float("principal_point_offset_y", 0.0, "shift of the picture in heights"),
         ],

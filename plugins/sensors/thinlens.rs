@@ -4,7 +4,7 @@
 //! |---|---|---|---|
 //! | `aperture_radius` | float | required | radius of the aperture in scene units; 0 makes it a pinhole |
 //! | `focus_distance` | float | `far_clip` | distance of the plane in focus, along z |
-//! | `fov`, `focal_length`, `fov_axis` | | | as for `perspective` |
+//! | `fov`, `focal_length`, `fov_axis` | | unset, 50mm, x | as for `perspective` |
 //! | `near_clip`, `far_clip` | float | 0.01, 10000 | what lies between is seen |
 //! | `to_world` | transform | identity | placement |
 //! | `shutter_open`, `shutter_close` | float | 0, 0 | exposure |

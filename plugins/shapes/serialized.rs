@@ -13,7 +13,7 @@
 //! ```xml
 //! <shape type="serialized">
 //!     <string name="filename" value="room.serialized"/>
-//!     <integer name="shape_index" value="3"/>
+//!     <integer name="shape_index" value="1"/>
 //! </shape>
 //! ```
 

@@ -29,8 +29,8 @@ pub const PLUGIN: Plugin = Plugin {
 };
 
 fn build(p: &Properties<'_>) -> Built<dyn Texture> {
-    let color = p.rgb("color");
-    if color.max_component() > 1.0 && !p.bool("unbounded") {
+    let (color, unbounded) = (p.rgb("color"), p.bool("unbounded"));
+    if color.max_component() > 1.0 && !unbounded {
         return Err(p.error("color", "\"color\" must be in [0, 1] unless \"unbounded\" is true"));
     }
     Ok(Arc::new(Constant(color)))

@@ -12,21 +12,19 @@ pub enum Budget {
     Seconds(f64),
 }
 
-/// The sample ranges of the passes: 1, 1, 2, 4, 8, then 16 samples each. It depends on nothing but the pass, so that
-/// a run that stops early is the beginning of a longer one.
+/// The sample ranges of the passes: 16 of one sample per pixel, then each an eighth to a sixteenth of what is there, at
+/// most 16 samples. It depends on nothing but the pass, so that a run that stops early is the beginning of a longer one;
+/// and since a pass that is cut short is lost, passes are short against what went before.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Schedule;
 
 impl Schedule {
-    /// Most samples per pixel in one pass.
-    const LARGEST: u32 = 16;
-
     /// First sample of a pass, and the first of the next one.
     pub fn pass(index: u32) -> (u32, u32) {
-        let start = |i: u32| match i {
-            0 => 0,
-            1..=5 => 1 << (i - 1),
-            _ => Self::LARGEST.saturating_mul(i - 4),
+        let start = |i: u32| match i / 8 {
+            0 => i,
+            doublings @ 1..=4 => (8 + i % 8) << (doublings - 1),
+            _ => 16_u32.saturating_mul(i - 32),
         };
         (start(index), start(index + 1))
     }
@@ -81,9 +79,14 @@ impl<'a> Control<'a> {
         self.stop.store(true, Ordering::Relaxed);
     }
 
-    /// Whether the run should end.
+    /// Whether [`stop`](Self::stop) was called.
+    pub fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    /// Whether the run should end: it was stopped, or the deadline has passed.
     pub fn should_stop(&self) -> bool {
-        self.stop.load(Ordering::Relaxed) || self.deadline.is_some_and(|d| Instant::now() >= d)
+        self.is_stopped() || self.deadline.is_some_and(|d| Instant::now() >= d)
     }
 
     /// Seconds since the start.
@@ -111,11 +114,11 @@ mod tests {
     #[test]
     fn passes_follow_each_other() {
         let mut next = 0;
-        for pass in 0..40 {
+        for pass in 0..100 {
             let (start, end) = Schedule::pass(pass);
-            assert!(start == next && end > start && end - start <= 16);
+            assert!(start == next && end > start && end - start <= 16 && end - start <= 1 + start / 8);
             next = end;
         }
-        assert_eq!((0..6).map(|i| Schedule::pass(i).1).collect::<Vec<_>>(), [1, 2, 4, 8, 16, 32]);
+        assert_eq!([8, 16, 24, 32, 40, 41].map(|i| Schedule::pass(i).0), [8, 16, 32, 64, 128, 144]);
     }
 }

@@ -90,7 +90,7 @@ impl<'a> RenderContext<'a> {
 pub struct Report {
     /// Samples per pixel of the passes that are complete.
     pub spp: u32,
-    /// Pixel samples taken, those of an incomplete last pass included.
+    /// Pixel samples taken, those of a pass that was cut short and lost included.
     pub samples: u64,
     /// Rays traced.
     pub rays: u64,

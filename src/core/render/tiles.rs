@@ -81,6 +81,8 @@ impl Run<'_, '_> {
             if start >= end || (pass > 0 && cx.control.should_stop()) {
                 break;
             }
+            // A pass that is cut short is lost, so that the picture is that of so many samples; but for the first one.
+            let before = (report.spp > 0).then(|| store.clone());
             let mut complete = true;
             for batch in tiles.chunks(BATCH) {
                 let results: Vec<TileResult> = batch
@@ -101,6 +103,7 @@ impl Run<'_, '_> {
                 }
             }
             if !complete {
+                store = before.unwrap_or(store);
                 break;
             }
             report.spp = end;
@@ -158,7 +161,8 @@ impl Run<'_, '_> {
         for y in 0..tile.size.y {
             for x in 0..tile.size.x {
                 // The first pass is finished in any case, so that every pixel has a sample, unless the user insists.
-                if cx.control.should_stop() && (complete_spp > 0 || matches!(cx.budget, Budget::Samples(_))) {
+                let stop = if complete_spp > 0 { cx.control.should_stop() } else { cx.control.is_stopped() };
+                if stop {
                     result.complete = false;
                     return result;
                 }

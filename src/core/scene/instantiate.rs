@@ -7,7 +7,7 @@ use super::check::check;
 use super::description::{Description, Node, NodeId, ObjectKind, Parameter, Value};
 use super::error::{SceneError, SceneErrors};
 use super::object::{BuiltSensor, BuiltShape, Object};
-use super::properties::Properties;
+use super::properties::{Properties, Reads, Trace};
 use super::registry::{Built, Constructor, Failed, Plugin, Registry};
 use super::world::{EmitterSource, Scene};
 use crate::accel::Geometry;
@@ -64,6 +64,29 @@ pub fn build_one(registry: &Registry, description: &Description) -> Result<Objec
         _ if errors.is_empty() => Err(SceneError::anywhere("the object could not be built").into()),
         _ => Err(SceneErrors(errors)),
     }
+}
+
+/// The parameters that constructors ask for while a whole scene is built, even if it cannot be: for tests of plugin
+/// tables.
+///
+/// # Panics
+/// Where a constructor asks for a parameter that is not in its table.
+///
+/// # Errors
+/// What keeps a scene from being built at all: the findings of [`check`].
+#[doc(hidden)]
+pub fn trace_reads(registry: &Registry, description: &Description) -> Result<Reads, SceneErrors> {
+    let mut description = description.clone();
+    add_defaults(&mut description);
+    let found = check(registry, &description, false);
+    if !found.errors.is_empty() {
+        return Err(SceneErrors(found.errors));
+    }
+    let trace = Trace::default();
+    let builder = Builder { trace: Some(&trace), ..Builder::new(registry, &description, false) };
+    builder.build_all();
+    drop(builder);
+    Ok(trace.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner))
 }
 
 /// Adds what a scene may leave out: materials of shapes, film and sampler of sensors, the filter of films.
@@ -142,6 +165,7 @@ struct Builder<'a> {
     outcomes: Vec<OnceLock<Outcome>>,
     errors: Mutex<Vec<SceneError>>,
     warnings: Mutex<Vec<String>>,
+    trace: Option<&'a Trace>,
 }
 
 impl<'a> Builder<'a> {
@@ -153,6 +177,7 @@ impl<'a> Builder<'a> {
             outcomes: (0..description.nodes.len()).map(|_| OnceLock::new()).collect(),
             errors: Mutex::default(),
             warnings: Mutex::default(),
+            trace: None,
         }
     }
 
@@ -299,6 +324,7 @@ impl<'a> Builder<'a> {
             errors: RefCell::default(),
             warnings: RefCell::default(),
             missing_file: Cell::new(false),
+            trace: self.trace,
         })
     }
 

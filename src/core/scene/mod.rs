@@ -26,6 +26,8 @@ pub mod xml;
 
 pub use description::{Description, Node, NodeId, ObjectKind, Parameter, SpectrumValue, Value};
 pub use error::{Location, SceneError, SceneErrors, did_you_mean};
+#[doc(hidden)]
+pub use instantiate::trace_reads;
 pub use instantiate::{Instantiated, build_one, instantiate};
 pub use object::{BuiltSensor, BuiltShape, Object};
 pub use param::{Param, Slot};

@@ -16,8 +16,9 @@ use crate::interfaces::{Bsdf, ColorSource, Film, Integrator, Rfilter, Sampler, S
 use crate::math::{Transform, Vec3};
 use glam::DMat4;
 use std::cell::{Cell, RefCell};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// The parameters and built children of one object.
 pub struct Properties<'a> {
@@ -34,7 +35,15 @@ pub struct Properties<'a> {
     pub(super) warnings: RefCell<Vec<String>>,
     /// Whether one of the errors is a missing file.
     pub(super) missing_file: Cell<bool>,
+    /// Where a test wants to see what the constructor reads.
+    pub(super) trace: Option<&'a Trace>,
 }
+
+/// Parameters that constructors have asked for, whether a scene sets them or not: kind, plugin, parameter.
+pub type Reads = BTreeSet<(ObjectKind, &'static str, &'static str)>;
+
+/// [`Reads`] that objects built in parallel share.
+pub(super) type Trace = Mutex<Reads>;
 
 impl<'a> Properties<'a> {
     fn spec(&self, name: &str) -> &'static Param {
@@ -45,7 +54,15 @@ impl<'a> Properties<'a> {
     }
 
     fn value(&self, name: &str) -> Option<&Value> {
+        self.trace(name);
         self.node.parameter(name).map(|p| &p.value)
+    }
+
+    fn trace(&self, name: &str) {
+        if let Some(trace) = self.trace {
+            let read = (self.node.kind, self.plugin.name, self.spec(name).name);
+            trace.lock().unwrap_or_else(PoisonError::into_inner).insert(read);
+        }
     }
 
     /// Whether the scene sets the parameter.
@@ -310,6 +327,7 @@ impl<'a> Properties<'a> {
     }
 
     fn texture_in(&self, name: &str) -> Option<Arc<dyn Texture>> {
+        self.trace(name);
         self.children.iter().find(|(slot, _)| *slot == name).and_then(|(_, object)| match object {
             Object::Texture(texture) => Some(texture.clone()),
             _ => None,
