@@ -16,7 +16,7 @@ use support::{Entry, load_entry, manifest, read_exr, render};
 const PASSES: u32 = 8;
 
 /// Samples per pixel of each pass.
-const SPP: u32 = 32;
+const SPP: u32 = 16;
 
 /// Share of pixels that must agree at the level of [`SIGNIFICANCE`] with Šidák's correction.
 const PIXELS: f64 = 0.9975;
