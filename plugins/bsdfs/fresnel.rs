@@ -61,10 +61,13 @@ pub fn conductor(cos_theta_i: f32, eta: Rgb, k: Rgb) -> Rgb {
 
 /// Mean Fresnel reflectance of a dielectric under evenly spread light, within 1 %: fits by Egan and Hilgeman (1973)
 /// below an index of 1 and by d'Eon and Irving (2011) above.
+///
+/// The first fit passes 1 below an index of 0.2; there the exact relation of both sides of an interface takes over.
 pub fn diffuse_reflectance(eta: f32) -> f32 {
     let inv = 1.0 / eta;
     if eta < 1.0 {
-        0.0636 * inv + (eta * (eta * -1.4399 + 0.7099) + 0.6681)
+        let fit = 0.0636 * inv + (eta * (eta * -1.4399 + 0.7099) + 0.6681);
+        if fit < 1.0 { fit } else { 1.0 - (1.0 - diffuse_reflectance(inv)) * eta * eta }
     } else {
         let fit = [0.919317, -3.4793, 6.75335, -7.80989, 4.98554, -1.36881];
         fit.iter().rev().fold(0.0, |sum, c| sum * inv + c)

@@ -104,7 +104,7 @@ impl Bxdf for RoughMetal {
         if wi.z <= 0.0 || wo.z <= 0.0 {
             return (Rgb::BLACK, 0.0);
         }
-        let h = (wi + wo).normalize();
+        let Some(h) = (wi + wo).try_normalize() else { return (Rgb::BLACK, 0.0) };
         let cos_h = wi.dot(h);
         let d = self.facets.eval(h);
         if d == 0.0 || cos_h <= 0.0 {

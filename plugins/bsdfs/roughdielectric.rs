@@ -4,6 +4,9 @@
 //! the sampled facet. Radiance that crosses the interface is scaled by 1/η². Light that is scattered several times by
 //! the surface is lost.
 //!
+//! With `sample_visible` = false the weight of a sample is that of the reference renderer, which leaves out that the
+//! normals were drawn from a wider distribution than the surface's: such pictures are a little too bright or dark.
+//!
 //! | parameter | type | default | meaning |
 //! |---|---|---|---|
 //! | `int_ior` | float or material name | bk7 | index of refraction inside; must differ from `ext_ior` |

@@ -124,7 +124,7 @@ impl Bxdf for RoughCoated {
         if !(wi.z > 0.0 && wo.z > 0.0) {
             return (Rgb::BLACK, 0.0);
         }
-        let h = (wi + wo).normalize();
+        let Some(h) = (wi + wo).try_normalize() else { return (Rgb::BLACK, 0.0) };
         let d = self.facets.eval(h);
         let g1 = self.facets.smith_g1(wi, h);
         let p_specular = self.p_specular(wi.z);

@@ -81,21 +81,27 @@ impl SphereGrid {
         ring.min(self.rings - 1) * self.spokes + spoke.min(self.spokes - 1)
     }
 
-    /// The integral of a density per solid angle over each cell, to an absolute error of about `tolerance`.
+    /// The integral of a density per solid angle over each cell, finer where
+    /// halving a part of a cell changes its integral by more than `tolerance`.
     pub fn integrate(&self, pdf: impl Fn(Vec3) -> f32, tolerance: f64) -> Vec<f64> {
-        let density = |cos_theta: f64, phi: f64| {
-            let sin_theta = (1.0 - cos_theta * cos_theta).max(0.0).sqrt();
+        // Integrated over (θ, φ): the poles, where many cells meet, are seen as finely as the rest.
+        let density = |theta: f64, phi: f64| {
+            let (sin_theta, cos_theta) = theta.sin_cos();
             let d = [sin_theta * phi.cos(), sin_theta * phi.sin(), cos_theta];
-            f64::from(pdf(Vec3::from_array(d.map(|v| v as f32))))
+            f64::from(pdf(Vec3::from_array(d.map(|v| v as f32)))) * sin_theta
         };
-        let (dz, dphi) = (2.0 / self.rings as f64, TAU / self.spokes as f64);
+        let edge = |ring: usize| (2.0 * ring as f64 / self.rings as f64 - 1.0).acos();
+        let dphi = TAU / self.spokes as f64;
         let mut cells = Vec::with_capacity(self.rings * self.spokes);
         for ring in 0..self.rings {
             for spoke in 0..self.spokes {
-                let cell = Cell { z: -1.0 + ring as f64 * dz, phi: spoke as f64 * dphi, dz, dphi };
-                // One split in any case, so that a peak between the nodes is not overlooked.
-                let parts = cell.quarters();
-                cells.push(parts.iter().map(|q| q.integrate(&density, q.gauss(&density), tolerance, 0)).sum());
+                let (theta, phi) = (edge(ring + 1), spoke as f64 * dphi);
+                let cell = Cell { theta, phi, dtheta: edge(ring) - theta, dphi };
+                // Some splits in any case, so that nothing narrow is overlooked between the nodes; slabs at the
+                // horizon, near which densities break off.
+                let at_horizon = ring == self.rings / 2 || ring + 1 == self.rings / 2;
+                let parts = cell.split(if at_horizon { 16 } else { 2 }, 2);
+                cells.push(parts.map(|part| part.integrate(&density, part.gauss(&density), tolerance, 0)).sum());
             }
         }
         cells
@@ -118,24 +124,25 @@ impl SphereGrid {
     }
 }
 
-/// A rectangle in (cos θ, φ).
+/// A rectangle in (θ, φ).
 #[derive(Clone, Copy)]
 struct Cell {
-    z: f64,
+    theta: f64,
     phi: f64,
-    dz: f64,
+    dtheta: f64,
     dphi: f64,
 }
 
 impl Cell {
-    const MAX_DEPTH: u32 = 9;
+    const MAX_DEPTH: u32 = 6;
 
-    fn quarters(&self) -> [Cell; 4] {
-        let (dz, dphi) = (self.dz / 2.0, self.dphi / 2.0);
-        [(0.0, 0.0), (dz, 0.0), (0.0, dphi), (dz, dphi)].map(|(a, b)| Cell {
-            z: self.z + a,
-            phi: self.phi + b,
-            dz,
+    /// Parts of equal size: so many over θ, so many over φ.
+    fn split(self, thetas: usize, phis: usize) -> impl Iterator<Item = Cell> {
+        let (dtheta, dphi) = (self.dtheta / thetas as f64, self.dphi / phis as f64);
+        (0..thetas * phis).map(move |i| Cell {
+            theta: self.theta + (i / phis) as f64 * dtheta,
+            phi: self.phi + (i % phis) as f64 * dphi,
+            dtheta,
             dphi,
         })
     }
@@ -151,20 +158,24 @@ impl Cell {
         let mut sum = 0.0;
         for (x, wx) in NODES {
             for (y, wy) in NODES {
-                sum += wx * wy * f(self.z + x * self.dz, self.phi + y * self.dphi);
+                sum += wx * wy * f(self.theta + x * self.dtheta, self.phi + y * self.dphi);
             }
         }
-        sum * self.dz * self.dphi
+        sum * self.dtheta * self.dphi
     }
 
-    /// Splits until halving the cell changes no more than the tolerance.
+    /// Splits until halving the cell changes no more than the tolerance, or the cell is as small as it gets.
     fn integrate(&self, f: &impl Fn(f64, f64) -> f64, coarse: f64, tolerance: f64, depth: u32) -> f64 {
-        let parts = self.quarters().map(|q| (q, q.gauss(f)));
+        let mut parts = [(*self, 0.0); 4];
+        for (part, quarter) in parts.iter_mut().zip(self.split(2, 2)) {
+            *part = (quarter, quarter.gauss(f));
+        }
         let fine: f64 = parts.iter().map(|(_, value)| value).sum();
-        if (fine - coarse).abs() <= tolerance || depth >= Self::MAX_DEPTH {
+        let refine = (fine - coarse).abs() > tolerance; // not for NaN
+        if !refine || depth >= Self::MAX_DEPTH {
             return fine;
         }
-        parts.iter().map(|(q, value)| q.integrate(f, *value, tolerance / 2.0, depth + 1)).sum()
+        parts.iter().map(|(part, value)| part.integrate(f, *value, tolerance, depth + 1)).sum()
     }
 }
 
