@@ -1,7 +1,7 @@
 //! Bad scenes that are too large to be kept as files.
 
-use crate::run::{Folder, Run, report_slowest, scene};
 use crate::REFUSED;
+use crate::run::{Folder, Run, report_slowest, scene};
 use flate2::{Compression, write::ZlibEncoder};
 use std::fs;
 use std::io::Write;

@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// A run that takes longer hangs. Runs take milliseconds; this is no measure of speed.
-const HANGS: Duration = Duration::from_secs(60);
+const HANGS: Duration = Duration::from_secs(30);
 
 /// Address space in KiB: far above what a small scene needs, far below what the lies of a header ask for.
 const MOST_MEMORY: u32 = 3 << 20;
@@ -24,12 +24,7 @@ pub struct Run {
 
 impl Run {
     /// Runs `lucerna render SCENE -o OUTPUT …` in `folder`.
-    pub fn render(
-        folder: &Path,
-        scene: &Path,
-        output: &Path,
-        arguments: impl IntoIterator<Item = String>,
-    ) -> Run {
+    pub fn render(folder: &Path, scene: &Path, output: &Path, arguments: impl IntoIterator<Item = String>) -> Run {
         let mut all: Vec<OsString> = vec!["render".into(), scene.into(), "-o".into(), output.into()];
         all.extend(arguments.into_iter().map(OsString::from));
         Self::program(folder, &all)
@@ -46,7 +41,12 @@ impl Run {
             Command::new(program)
         };
         // Two threads, so that their stacks do not count against the limit on machines with many cores.
-        command.args(arguments).current_dir(folder).env("RAYON_NUM_THREADS", "2").stdin(Stdio::null());
+        command
+            .args(arguments)
+            .current_dir(folder)
+            .env("RAYON_NUM_THREADS", "2")
+            .env_remove("RUST_BACKTRACE")
+            .stdin(Stdio::null());
         // Into a file: a pipe that nobody empties would block the program, and so hide what it says.
         let messages = std::env::temp_dir().join(format!("lucerna-messages-{}-{}", std::process::id(), unique()));
         let start = Instant::now();
@@ -99,7 +99,8 @@ pub fn report_slowest<N: AsRef<str>>(runs: &[(N, Run)]) {
 
 /// A small scene with a sensor, a light, and `body`, which starts in line 5.
 pub fn scene(body: &str) -> String {
-    let film = "<film type=\"hdrfilm\"><integer name=\"width\" value=\"8\"/><integer name=\"height\" value=\"8\"/></film>";
+    let film =
+        "<film type=\"hdrfilm\"><integer name=\"width\" value=\"8\"/><integer name=\"height\" value=\"8\"/></film>";
     format!(
         "<scene version=\"3.0.0\">\n<integrator type=\"path\"/>\n<sensor type=\"perspective\">{film}</sensor>\n\
          <emitter type=\"constant\"/>\n{body}</scene>\n"

@@ -168,9 +168,11 @@ impl<'a> Properties<'a> {
             Ok(path) => Ok(path),
             Err(why) => {
                 self.missing_file.set(true);
-                let at = self.node.parameter(name).map_or(&self.node.at, |p| &p.at);
-                self.errors.borrow_mut().push(SceneError::at(at, format!("file \"{text}\" not found")).hint(why));
-                Err(Failed)
+                let failed = self.error(name, format!("could not find the file \"{text}\""));
+                if let Some(error) = self.errors.borrow_mut().last_mut() {
+                    error.hint = Some(why);
+                }
+                Err(failed)
             }
         }
     }
@@ -229,8 +231,10 @@ impl<'a> Properties<'a> {
         if let Some(texture) = self.texture_in(name) {
             return Some(match (texture.spectrum(), texture.constant()) {
                 (Some(spectrum), _) => ColorSource::Constant(self.spectrum_color(name, spectrum, slot)),
-                (None, Some(color)) => ColorSource::Constant(color),
-                (None, None) => ColorSource::Textured(self.bounded(name, texture, slot)),
+                (None, constant) => match (self.bounded(name, texture, slot), constant) {
+                    (texture, Some(_)) => ColorSource::Constant(texture.constant().unwrap_or_default()),
+                    (texture, None) => ColorSource::Textured(texture),
+                },
             });
         }
         let constant = match (self.value(name), spec.default) {
@@ -281,8 +285,11 @@ impl<'a> Properties<'a> {
         color
     }
 
-    /// A reflectance above 1 would make light out of nothing: it is clamped.
+    /// A reflectance above 1 would make light out of nothing: it is clamped. Nothing may be negative.
     fn bounded(&self, name: &str, texture: Arc<dyn Texture>, slot: Slot) -> Arc<dyn Texture> {
+        if let Some(min) = texture.minimum().filter(|min| *min < 0.0) {
+            self.error(name, format!("the texture of \"{name}\" falls to {min}, but must not be negative"));
+        }
         match texture.maximum() {
             Some(max) if max > 1.0 && slot == Slot::Reflectance => {
                 self.warn(name, format!("the texture of \"{name}\" reaches {max} and is clamped to 1"));

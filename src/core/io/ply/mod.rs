@@ -347,7 +347,10 @@ mod tests {
         assert_eq!(faces("3 0 1 2\n3 0 1 4"), "face 1 (from 0): index 4 is out of range, there are 4");
         assert_eq!(faces("3 0 1 -1"), "face 0 (from 0): index -1 is out of range, there are 4");
         assert_eq!(faces("2 0 1"), "face 0 (from 0) has only 2 corners");
-        assert_eq!(faces("3 0 1"), "line 14: declares 3 list entries of at least 2 bytes, but only 4 bytes are left");
+        assert_eq!(
+            faces("3 0 1"),
+            "line 14: declares 3 list entries of at least 2 bytes each, but only 4 bytes are left"
+        );
         assert_eq!(faces("3 0 1 x"), "line 14: no number for \"vertex_indices\"");
         assert!(faces("200 0 1 2").starts_with("line 14: declares 200"));
         assert!(faces("-3 0 1 2").starts_with("line 14: "));

@@ -134,12 +134,13 @@ impl Loader<'_> {
     }
 
     fn read_file(&mut self, path: &Path) -> Option<NodeId> {
-        let name: Arc<str> = path.strip_prefix(".").unwrap_or(path).display().to_string().into();
+        let plain = path.strip_prefix(".").ok().filter(|rest| !rest.as_os_str().is_empty()).unwrap_or(path);
+        let name: Arc<str> = plain.display().to_string().into();
         let whole_file = Location::file(Arc::clone(&name));
         let text = self
             .description
             .check_confinement(path)
-            .and_then(|()| std::fs::read(path).map_err(|error| crate::scene::description::plain_io_error(&error)))
+            .and_then(|()| crate::io::read_bytes(path).map_err(|error| error.message))
             .map_err(|reason| SceneError::at(&whole_file, "could not read the file").hint(reason))
             .and_then(|bytes| source::decode(&bytes, &name));
         match text {
