@@ -138,7 +138,7 @@ impl Checker<'_> {
         let error = match self.description.locate(name) {
             Ok(path) if path.is_dir() => SceneError::at(&parameter.at, format!("\"{name}\" is a folder, not a file")),
             Ok(_) => return,
-            Err(why) => SceneError::at(&parameter.at, format!("could not find the file \"{name}\"")).hint(why),
+            Err(why) => SceneError::at(&parameter.at, format!("could not open the file \"{name}\"")).hint(why),
         };
         self.report(node, error);
     }
@@ -176,8 +176,9 @@ impl Checker<'_> {
         if fits || (is_of_media(kind) && self.registry.of_kind(kind).next().is_none()) {
             return;
         }
+        let is_slot = named.is_some_and(|spec| !matches!(spec.ty, ParamType::Child(..)));
         let message = match named {
-            Some(spec) if !matches!(spec.ty, ParamType::Child(..)) => {
+            Some(spec) if is_slot => {
                 format!(
                     "\"{}\" must be {}, not {}",
                     spec.name,
@@ -187,7 +188,8 @@ impl Checker<'_> {
             }
             _ => format!("{} has no place here", with_article(kind.tag())),
         };
-        self.report(node, SceneError::at(&parameter.at, message).hint(accepted_children(table)));
+        let error = SceneError::at(&parameter.at, message);
+        self.report(node, if is_slot { error } else { error.hint(accepted_children(self.registry, table)) });
     }
 
     fn unknown_parameter(&mut self, node: &Node, table: Table<'_>, parameter: &Parameter) {
@@ -261,10 +263,12 @@ fn with_article(noun: &str) -> String {
     }
 }
 
-fn accepted_children(table: Table<'_>) -> String {
+fn accepted_children(registry: &Registry, table: Table<'_>) -> String {
     let kinds: Vec<&str> = table
         .params()
-        .filter_map(|p| if let ParamType::Child(kind, ..) = p.ty { Some(kind.tag()) } else { None })
+        .filter_map(|p| if let ParamType::Child(kind, ..) = p.ty { Some(kind) } else { None })
+        .filter(|kind| *kind == ObjectKind::Scene || registry.of_kind(*kind).next().is_some())
+        .map(ObjectKind::tag)
         .collect();
     match kinds.as_slice() {
         [] => "nothing can be nested here".to_owned(),

@@ -134,14 +134,16 @@ impl std::error::Error for SceneErrors {}
 
 /// The candidate nearest to `word` by edit distance, if it is near enough to be what was meant.
 ///
-/// At most a third of the letters may differ, and letter case and underscores do not count.
+/// At most a third of the letters (rounded) and not all may differ; letter case and underscores do not count.
 pub fn did_you_mean<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let plain = |s: &str| s.chars().filter(|c| *c != '_').flat_map(char::to_lowercase).collect::<Vec<_>>();
     let word = plain(word);
     candidates
         .into_iter()
         .map(|candidate| (edit_distance(&word, &plain(candidate)), candidate))
-        .filter(|(distance, candidate)| *distance <= 1.max(candidate.len().min(word.len()) / 3))
+        .filter(|(distance, candidate)| {
+            *distance <= 1.max((candidate.len().max(word.len()) + 1) / 3) && *distance < word.len()
+        })
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, candidate)| candidate)
 }
@@ -173,6 +175,9 @@ mod tests {
         assert_eq!(did_you_mean("radianse", ["radiance", "scale"]), Some("radiance"));
         assert_eq!(did_you_mean("toWorld", ["to_world", "to_uv"]), Some("to_world"));
         assert_eq!(did_you_mean("difuse", ["diffuse", "plastic"]), Some("diffuse"));
+        assert_eq!(did_you_mean("alfa", ["alpha", "eta"]), Some("alpha"));
+        assert_eq!(did_you_mean("disk", ["mask", "box"]), None);
+        assert_eq!(did_you_mean("z", ["x", "y"]), None);
         assert_eq!(did_you_mean("zzz", ["diffuse", "plastic"]), None);
         assert_eq!(edit_distance(&['a', 'b'], &['b', 'a']), 1);
     }

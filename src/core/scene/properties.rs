@@ -71,14 +71,23 @@ impl<'a> Properties<'a> {
     /// Tells an error about a parameter (at its position, or the object's if it is not set).
     pub fn error(&self, name: &str, message: impl Into<String>) -> Failed {
         let at = self.node.parameter(name).map_or(&self.node.at, |p| &p.at);
-        self.errors.borrow_mut().push(SceneError::at(at, message));
+        let error = SceneError::at(at, message);
+        let mut errors = self.errors.borrow_mut();
+        // A constructor may read a parameter twice.
+        if !errors.contains(&error) {
+            errors.push(error);
+        }
         Failed
     }
 
     /// Tells the user about something odd that does not stop the render.
     pub fn warn(&self, name: &str, message: impl Into<String>) {
         let at = self.node.parameter(name).map_or(&self.node.at, |p| &p.at);
-        self.warnings.borrow_mut().push(format!("{at}: {}", message.into()));
+        let warning = format!("{at}: {}", message.into());
+        let mut warnings = self.warnings.borrow_mut();
+        if !warnings.contains(&warning) {
+            warnings.push(warning);
+        }
     }
 
     /// Two parameters of which at most one may be set.
@@ -168,7 +177,7 @@ impl<'a> Properties<'a> {
             Ok(path) => Ok(path),
             Err(why) => {
                 self.missing_file.set(true);
-                let failed = self.error(name, format!("could not find the file \"{text}\""));
+                let failed = self.error(name, format!("could not open the file \"{text}\""));
                 if let Some(error) = self.errors.borrow_mut().last_mut() {
                     error.hint = Some(why);
                 }
@@ -203,7 +212,7 @@ impl<'a> Properties<'a> {
     /// A transform with its inverse; identity if not set. A singular one is an error.
     pub fn transform(&self, name: &str) -> Result<Transform, Failed> {
         Transform::new(self.matrix(name))
-            .ok_or_else(|| self.error(name, format!("\"{name}\" is singular: it flattens the scene or is not affine")))
+            .ok_or_else(|| self.error(name, format!("\"{name}\" is singular: it flattens the object or is not affine")))
     }
 
     /// A constant colour, if set or with a default.

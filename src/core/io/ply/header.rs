@@ -99,7 +99,7 @@ fn not_understood(error: &str) -> String {
     match error.strip_prefix("Line ").and_then(|rest| rest.split(':').next()) {
         Some("1") => "line 1: there is more than \"ply\"".to_owned(),
         Some("2") => "line 2: the format is not ascii, binary_little_endian or binary_big_endian 1.0".to_owned(),
-        Some(line) => format!("line {line}: the header declares no element with a count or property with a known type"),
+        Some(line) => format!("line {line}: neither an element with its count nor a property of a known type"),
         None => "the header is damaged".to_owned(),
     }
 }

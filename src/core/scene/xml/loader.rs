@@ -205,7 +205,10 @@ impl Loader<'_> {
     fn check_definitions(&mut self) {
         for (name, value, meant) in self.definitions.unused() {
             let mut error = SceneError::anywhere(format!("unused parameter: ${name}={value}"));
-            error.hint = meant.map(|meant| format!("did you mean \"{meant}\"?"));
+            error.hint = Some(match meant {
+                Some(meant) => format!("did you mean \"{meant}\"?"),
+                None => format!("nothing in the scene refers to ${name}"),
+            });
             match self.options.lenient {
                 true => self.description.warnings.push(error.to_string()),
                 false => self.errors.push(error),

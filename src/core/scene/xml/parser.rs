@@ -236,8 +236,13 @@ impl<'l, 'o> FileParser<'l, 'o> {
         let (message, hint) = if transform::OPERATIONS.contains(&tag) {
             (format!("transform operation <{tag}> can only appear inside a <transform> tag"), None)
         } else {
+            let today = match tag {
+                "camera" => Some("sensor"),
+                "luminaire" => Some("emitter"),
+                _ => None,
+            };
             let known = ObjectKind::ALL.iter().map(|kind| kind.tag()).chain(PROPERTIES).chain(DIRECTIVES);
-            let meant = did_you_mean(tag, known).map(|meant| format!("did you mean <{meant}>?"));
+            let meant = today.or_else(|| did_you_mean(tag, known)).map(|meant| format!("did you mean <{meant}>?"));
             (format!("encountered an unsupported XML element: <{tag}>"), meant)
         };
         if self.loader.options.lenient {
