@@ -7,15 +7,16 @@
 use lucerna::core::render::{Budget, Control, RenderContext};
 use lucerna::core::scene::xml::{LoadOptions, load_str};
 use lucerna::core::scene::{Description, ObjectKind, Registry, Value, instantiate, resolve, upgrade};
+use std::cell::Cell;
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, Once};
 
 /// Damaged versions of each scene.
-const VERSIONS: usize = 12;
+const VERSIONS: usize = 400;
 /// Damaged versions of each mesh and picture.
-const FILE_VERSIONS: usize = 40;
+const FILE_VERSIONS: usize = 1500;
 /// Most pixels per side and most bounces: the question is whether it renders, not what.
 const SIDE: i64 = 4;
 const BOUNCES: i64 = 8;
@@ -111,7 +112,7 @@ fn damage_text(text: &mut String, registry: &Registry, random: &mut Random) {
         7 | 8 => {
             let mut lines: Vec<&str> = text.lines().collect();
             let (from, to) = (random.below(lines.len()), random.below(lines.len()));
-            let line = lines[from];
+            let Some(&line) = lines.get(from) else { return };
             match random.below(3) {
                 0 => drop(lines.remove(from)),
                 1 => lines.insert(to, line),
@@ -194,20 +195,39 @@ fn render(text: &str, folder: &Path, registry: &Registry) -> bool {
 /// What the last panics said, as the hook heard it.
 static PANICS: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
+thread_local! {
+    /// Whether this thread is inside of a step.
+    static LISTENING: Cell<bool> = const { Cell::new(false) };
+}
+
 /// Runs `step`; says what it panicked with.
 fn panic_of(step: impl FnOnce()) -> Option<String> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
-        std::panic::set_hook(Box::new(|panic| {
-            if let Ok(mut heard) = PANICS.lock() {
+        let usual = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            // Panics of the test itself come from its own thread, outside of a step.
+            if std::thread::current().name().is_some() && !LISTENING.get() {
+                usual(panic);
+            } else if let Ok(mut heard) = PANICS.lock() {
                 heard.push(panic.to_string());
             }
         }));
     });
-    catch_unwind(AssertUnwindSafe(step)).err().map(|_| {
+    LISTENING.set(true);
+    let result = catch_unwind(AssertUnwindSafe(step));
+    LISTENING.set(false);
+    result.err().map(|_| {
         let heard = PANICS.lock().map(|mut heard| std::mem::take(&mut *heard)).unwrap_or_default();
         heard.join("; ").replace('\n', " ")
     })
+}
+
+/// Fails if anything panicked, or if the damage was too great or too small to say much.
+fn conclude(rendered: usize, all: usize, panics: &[String]) {
+    eprintln!("{rendered} of {all} rendered, {} panicked", panics.len());
+    assert!(panics.is_empty(), "{}", panics.join("\n"));
+    assert!(rendered > all / 10 && rendered < all);
 }
 
 /// Test scenes with their folders, in order.
@@ -237,12 +257,7 @@ fn damaged_scenes_never_panic() {
             panics.extend(panic.map(|said| format!("{} version {version}: {said}", path.display())));
         }
     }
-    let all = scenes.len() * VERSIONS;
-    assert!(panics.is_empty(), "{} of {all}:\n{}", panics.len(), panics.join("\n"));
-    assert!(
-        rendered > all / 10 && rendered < all,
-        "{rendered} of {all} rendered: is the damage too great or too small?"
-    );
+    conclude(rendered, scenes.len() * VERSIONS, &panics);
 }
 
 #[test]
@@ -270,12 +285,7 @@ fn damaged_meshes_and_pictures_never_panic() {
         }
     }
     fs::remove_dir_all(&temporary).unwrap();
-    let all = paths.len() * FILE_VERSIONS;
-    assert!(panics.is_empty(), "{} of {all}:\n{}", panics.len(), panics.join("\n"));
-    assert!(
-        rendered > all / 10 && rendered < all,
-        "{rendered} of {all} rendered: is the damage too great or too small?"
-    );
+    conclude(rendered, paths.len() * FILE_VERSIONS, &panics);
 }
 
 /// A scene that uses the file as a shining mesh, or as a reflectance, a roughness and a sky.

@@ -129,8 +129,9 @@ impl Beam {
             let d = if ray.d[axis].abs() < tiny { tiny.copysign(ray.d[axis]) } else { ray.d[axis] };
             let inv = 1.0 / d;
             beam.inv_d[axis] = inv;
-            beam.near_offset[axis] = o[axis] * inv + margin * inv.abs();
-            beam.far_offset[axis] = o[axis] * inv - margin * inv.abs();
+            // Kept finite, also in scenes of 10³⁸, since ∞ − ∞ would let rays into slots that are empty.
+            beam.near_offset[axis] = (o[axis] * inv + margin * inv.abs()).min(f32::MAX).max(f32::MIN);
+            beam.far_offset[axis] = (o[axis] * inv - margin * inv.abs()).max(f32::MIN).min(f32::MAX);
             beam.near_rows[axis] = if inv < 0.0 { axis + 3 } else { axis };
             beam.far_rows[axis] = if inv < 0.0 { axis } else { axis + 3 };
         }
