@@ -126,6 +126,26 @@ fn hc_i01_scenes_that_are_not_there() {
 }
 
 #[test]
+fn hc_x04_no_samples_is_a_wrong_argument() {
+    let folder = run::Folder::new("arguments");
+    for arguments in [["--spp", "0"], ["--spp", "-1"], ["--crop", "0,0,8"], ["--integrator", "pth"]] {
+        let run = Run::render(&folder.0, Path::new("none.xml"), Path::new("out.exr"), arguments.map(str::to_owned));
+        assert_eq!(run.broken(), None);
+        assert!(run.code == Some(REFUSED) && run.errors.starts_with("error: "), "{arguments:?}: {}", run.errors);
+    }
+}
+
+/// Without a scene, the built-in one is taken.
+#[test]
+fn hc_i09_a_wrong_integrator_of_the_command_line_is_named() {
+    let folder = run::Folder::new("option");
+    let arguments = ["render", "-o", "out.exr", "--integrator", "pth"].map(Into::into);
+    let run = Run::program(&folder.0, &arguments);
+    let message = "error: --integrator: unknown integrator plugin \"pth\" (did you mean \"path\"?)";
+    assert_eq!((run.errors.trim_end(), run.code), (message, Some(REFUSED)));
+}
+
+#[test]
 #[cfg(unix)]
 fn hc_i01_files_without_permission() {
     use std::os::unix::fs::PermissionsExt;

@@ -160,6 +160,8 @@ impl Loader<'_> {
     }
 
     fn read_text(&mut self, text: &str, name: Arc<str>, folder: &Path) -> Option<NodeId> {
+        // The XML reader would skip byte order marks without counting them.
+        let text = text.trim_start_matches('\u{feff}');
         let mut parser = FileParser::new(self, name, folder);
         match parser.run(text) {
             Ok(root) => Some(root),
