@@ -360,8 +360,9 @@ mod tests {
         assert_eq!(error(ascii(XYZ, &nan.replace("nan", "one"), LIST, "3 0 1 2")), "line 11: no number for \"x\"");
         assert!(error(ascii("float x, float y", "0 0", LIST, "3 0 0 0")).contains("no x, y and z"));
         assert!(error(ascii("float x, float y, float x", "0 0 0", LIST, "3 0 0 0")).contains("twice"));
-        assert_eq!(error(""), "line 1: the header has no end_header");
-        assert!(error("ply\nformat ascii 1.0\nelement vertex -4\nend_header\n").contains("Line 3"));
+        assert_eq!(error(""), "is not a PLY file: it does not begin with \"ply\"");
+        assert_eq!(error("ply\n"), "line 2: the header has no end_header");
+        assert!(error("ply\nformat ascii 1.0\nelement vertex -4\nend_header\n").starts_with("line 3: neither"));
         let file = String::from_utf8_lossy(&binary(false, false)).into_owned();
         for count in ["4000000000", "18446744073709551615"] {
             let huge = file.replace("vertex 4", &format!("vertex {count}"));
