@@ -112,6 +112,7 @@ struct Beam {
 
 impl Beam {
     #[inline(always)]
+    #[expect(clippy::manual_clamp, reason = "clamp would let NaN pass, which here must become the end of the range")]
     fn new(frame: &Frame, ray: &Ray) -> Self {
         let tiny = ray.d.abs().max_element() * 1e-18;
         let o = ray.o - frame.center;

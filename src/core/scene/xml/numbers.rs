@@ -28,7 +28,7 @@ pub(super) fn float(text: &str) -> Result<f64, Wrong> {
             "nan" | "inf" | "infinity" => Some("only finite numbers are allowed"),
             "" if number.is_empty() => Some("the value is empty"),
             other if other.starts_with("0x") => Some("only decimal numbers are allowed"),
-            _ if items(number).count() > 1 && items(number).all(|item| is_decimal(item)) => {
+            _ if items(number).count() > 1 && items(number).all(is_decimal) => {
                 Some("one number is needed, with a point before its fraction")
             }
             _ => Some("a number such as 0.5 or 1e-3 is needed"),

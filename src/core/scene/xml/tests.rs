@@ -160,7 +160,7 @@ fn hc_i01_missing_files() {
 fn hc_i02_malformed() {
     let cases = [
         ("", "a.xml: the file has no elements: it is no scene"),
-        ("<!-- x -->", "a.xml: the file has no elements"),
+        ("<!-- x -->", "a.xml: the file has no elements: it is no scene"),
         (
             "<scene version='3.0.0'>\n <bsdf type='a'>\n</scene>",
             "a.xml:3:1: the file is malformed: </scene> closes <bsdf> of line 2",
