@@ -20,7 +20,10 @@ pub use lucerna_plugins::builtin;
 /// The scene that is rendered when none is named.
 pub const DEFAULT_SCENE: &str = include_str!("../scenes/cornell-box.xml");
 
-/// Runs the command line with the given plugins. 0: done, 2: could not run, 3: bad samples under `--strict-nan`.
+/// Runs the command line with the given plugins.
+///
+/// The exit code is 0 when all is done, 2 when it could not be done (wrong arguments, a scene with mistakes, an output that
+/// cannot be written), and 3 when a render under `--strict-nan` met samples that were not finite or negative.
 pub fn run(registry: core::scene::Registry) -> std::process::ExitCode {
     cli::run(&registry)
 }

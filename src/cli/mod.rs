@@ -11,11 +11,15 @@ use clap::{Parser, Subcommand};
 use lucerna_core::scene::Registry;
 use std::process::ExitCode;
 
+/// Told at the end of the help.
+const EXIT_CODES: &str =
+    "Exit codes: 0 done; 2 could not run (arguments, scene or output); 3 bad samples under --strict-nan";
+
 /// Exit code of a run that could not be done.
 const FAILURE: u8 = 2;
 
 #[derive(Parser)]
-#[command(name = "lucerna", version, about, arg_required_else_help = true)]
+#[command(name = "lucerna", version, about, arg_required_else_help = true, after_help = EXIT_CODES)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,

@@ -7,7 +7,7 @@ use clap::Args;
 use lucerna_core::image::{self, Image, exr, png};
 use lucerna_core::interfaces::{ComponentFormat, FileFormat, Integrator};
 use lucerna_core::math::UVec2;
-use lucerna_core::render::{Budget, Control, RenderContext, Report, SampleOrder, replay};
+use lucerna_core::render::{Budget, Control, FilmStore, RenderContext, Report, SampleOrder, replay};
 use lucerna_core::scene::{
     BuiltSensor, Description, Location, Node, Object, ObjectKind, Parameter, Registry, Scene, Value, build_one,
 };
@@ -145,16 +145,9 @@ pub fn run(registry: &Registry, arguments: &Arguments) -> Result<ExitCode, Failu
     if arguments.reference_order.is_some() {
         scene.use_reference_offsets();
     }
+    check_complete(&scene, arguments)?;
     let camera = camera(registry, &scene, arguments)?;
-    let integrator = scene
-        .integrator()
-        .ok_or_else(|| {
-            Failure::new(format!(
-                "{}: the scene names no integrator (add one, or --integrator path)",
-                arguments.scene.name()
-            ))
-        })?
-        .clone();
+    let integrator = scene.integrator().ok_or_else(|| Failure::new("the scene has no integrator"))?.clone();
     let budget = match (arguments.seconds, arguments.spp) {
         (Some(seconds), _) => Budget::Seconds(seconds),
         (None, spp) => Budget::Samples(camera.sampler.round_spp(spp.unwrap_or(camera.sampler.sample_count()))),
@@ -171,11 +164,24 @@ fn tell_rounding(arguments: &Arguments, budget: Budget) {
     }
 }
 
+/// A scene may be read without a sensor or an integrator, but not rendered.
+fn check_complete(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
+    let name = arguments.scene.name();
+    let mut missing = Vec::new();
+    if scene.sensors().is_empty() {
+        missing.push(format!("error: {name}: the scene has no sensor (add a <sensor type=\"perspective\">)"));
+    }
+    if scene.integrator().is_none() {
+        missing.push(format!("error: {name}: the scene has no integrator (add one, or use --integrator path)"));
+    }
+    if missing.is_empty() { Ok(()) } else { Err(Failure(missing.join("\n"))) }
+}
+
 /// The chosen sensor, with another sampler if one is asked for.
 fn camera(registry: &Registry, scene: &Scene, arguments: &Arguments) -> Result<BuiltSensor, Failure> {
     let count = scene.sensors().len();
     let mut camera = scene.sensors().get(arguments.sensor).cloned().ok_or_else(|| match count {
-        0 => Failure::new(format!("{}: the scene has no sensor", arguments.scene.name())),
+        1 => Failure::new(format!("there is no sensor {}: the scene has one, number 0", arguments.sensor)),
         _ => Failure::new(format!("there is no sensor {}: the scene has {count}, counted from 0", arguments.sensor)),
     })?;
     if let Some(text) = &arguments.sampler {
@@ -214,15 +220,15 @@ fn render(
     });
     stop_on_interrupt(control);
 
-    let mut cx = RenderContext::new(scene, camera, budget, arguments.seed, control, integrator.aov_names());
-    if let Some([x, y, width, height]) = arguments.crop {
-        crop(&mut cx, UVec2::new(x, y), UVec2::new(width, height))?;
-    }
-    let needed = lucerna_core::render::FilmStore::bytes(cx.film.crop_size, integrator.aov_names().len()) >> 20;
+    let window = window(arguments, camera)?;
+    let needed = FilmStore::bytes(window.1, integrator.aov_names().len()) >> 20;
     if needed > arguments.max_memory {
-        let message = format!("the picture needs {needed} MiB, the limit is {} MiB", arguments.max_memory);
-        return Err(Failure::new(format!("{message} (raise it with --max-memory)")));
+        let name = arguments.scene.name();
+        let message = format!("{name}: the picture needs {needed} MiB, the limit is {} MiB", arguments.max_memory);
+        return Err(Failure::new(format!("{message} (raise it with --max-memory, or render a part with --crop)")));
     }
+    let mut cx =
+        RenderContext::of_window(scene, camera, window, budget, arguments.seed, control, integrator.aov_names());
     if let Some(threads) = arguments.reference_order {
         cx.order = SampleOrder::Reference { threads };
     }
@@ -237,14 +243,18 @@ fn render(
     Ok(if bad { ExitCode::from(BAD_SAMPLES) } else { ExitCode::SUCCESS })
 }
 
-fn crop(cx: &mut RenderContext<'_>, offset: UVec2, size: UVec2) -> Result<(), Failure> {
-    let film = cx.film.size;
+/// Offset and size of the part to render: that of `--crop`, or of the film.
+fn window(arguments: &Arguments, camera: &BuiltSensor) -> Result<(UVec2, UVec2), Failure> {
+    let settings = camera.film.settings();
+    let Some([x, y, width, height]) = arguments.crop else {
+        return Ok((settings.crop_offset, settings.crop_size));
+    };
+    let (film, offset, size) = (settings.size, UVec2::new(x, y), UVec2::new(width, height));
     let inside = offset.checked_add(size).is_some_and(|end| end.cmple(film).all());
     if !inside || size.min_element() == 0 {
         return Err(Failure::new(format!("--crop must lie inside the film of {} x {} pixels", film.x, film.y)));
     }
-    cx.crop(offset, size);
-    Ok(())
+    Ok((offset, size))
 }
 
 fn replay_pixel(

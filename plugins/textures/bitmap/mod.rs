@@ -112,7 +112,8 @@ struct Bitmap {
     wrap: Wrap,
     to_uv: UvTransform,
     mean: f32,
-    maximum: f32,
+    /// Smallest and largest value in any channel.
+    range: [f32; 2],
     /// Made when a light first asks for it. `None` inside if the picture is black.
     distribution: OnceLock<Option<Discrete2d>>,
 }
@@ -127,8 +128,8 @@ impl Bitmap {
     fn new(texels: Texels, filter: Filter, wrap: Wrap, to_uv: UvTransform) -> Self {
         let count = f64::from(texels.size.x) * f64::from(texels.size.y);
         let mean = (texels.scalars().map(f64::from).sum::<f64>() / count) as f32;
-        let maximum = texels.maximum();
-        Bitmap { texels, filter, wrap, to_uv, mean, maximum, distribution: OnceLock::new() }
+        let range = texels.range();
+        Bitmap { texels, filter, wrap, to_uv, mean, range, distribution: OnceLock::new() }
     }
 
     /// Position in texels; with `shift` of a half, counted from the centre of the first. Finite for any input.
@@ -228,7 +229,11 @@ impl Texture for Bitmap {
     }
 
     fn maximum(&self) -> Option<f32> {
-        Some(self.maximum)
+        Some(self.range[1])
+    }
+
+    fn minimum(&self) -> Option<f32> {
+        Some(self.range[0])
     }
 
     fn sample_position(&self, u2: Vec2) -> Option<(Vec2, f32)> {

@@ -112,9 +112,10 @@ impl Texels {
         (0..self.size.y).flat_map(move |y| (0..self.size.x).map(move |x| self.scalar(x, y)))
     }
 
-    /// Largest value in any channel.
-    pub fn maximum(&self) -> f32 {
+    /// Smallest and largest value in any channel.
+    pub fn range(&self) -> [f32; 2] {
         let count = self.size.x as usize * self.size.y as usize * if self.grey { 1 } else { 3 };
-        (0..count).map(|i| self.storage.get(i)).fold(f32::NEG_INFINITY, f32::max)
+        let widen = |[min, max]: [f32; 2], value: f32| [min.min(value), max.max(value)];
+        (0..count).map(|i| self.storage.get(i)).fold([f32::INFINITY, f32::NEG_INFINITY], widen)
     }
 }

@@ -112,6 +112,7 @@ struct Beam {
 
 impl Beam {
     #[inline(always)]
+    #[expect(clippy::manual_clamp, reason = "clamp would let NaN pass, which here must become the end of the range")]
     fn new(frame: &Frame, ray: &Ray) -> Self {
         let tiny = ray.d.abs().max_element() * 1e-18;
         let o = ray.o - frame.center;
@@ -129,8 +130,9 @@ impl Beam {
             let d = if ray.d[axis].abs() < tiny { tiny.copysign(ray.d[axis]) } else { ray.d[axis] };
             let inv = 1.0 / d;
             beam.inv_d[axis] = inv;
-            beam.near_offset[axis] = o[axis] * inv + margin * inv.abs();
-            beam.far_offset[axis] = o[axis] * inv - margin * inv.abs();
+            // Kept finite, also in scenes of 10³⁸, since ∞ − ∞ would let rays into slots that are empty.
+            beam.near_offset[axis] = (o[axis] * inv + margin * inv.abs()).min(f32::MAX).max(f32::MIN);
+            beam.far_offset[axis] = (o[axis] * inv - margin * inv.abs()).max(f32::MIN).min(f32::MAX);
             beam.near_rows[axis] = if inv < 0.0 { axis + 3 } else { axis };
             beam.far_rows[axis] = if inv < 0.0 { axis } else { axis + 3 };
         }

@@ -62,6 +62,12 @@ impl Rgb {
         self.r.max(self.g).max(self.b)
     }
 
+    /// Smallest of the three.
+    #[inline]
+    pub fn min_component(self) -> f32 {
+        self.r.min(self.g).min(self.b)
+    }
+
     /// Mean of the channels.
     #[inline]
     pub fn mean(self) -> f32 {

@@ -3,7 +3,7 @@
 use std::io::Cursor;
 
 use ::image::codecs::hdr::HdrDecoder;
-use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 
 use super::exr::separate;
 use super::{PixelData, ReadLimits, Samples};
@@ -17,8 +17,23 @@ pub(super) fn read(bytes: &[u8], extension: Option<&str>, limits: &ReadLimits) -
     shielded("the picture", || decode(bytes, format, limits))
 }
 
+/// What the decoder says, without the names it gives to itself.
+fn damaged(error: ImageError) -> IoError {
+    let reason = match &error {
+        ImageError::IoError(error) if error.kind() == std::io::ErrorKind::UnexpectedEof => "the file ends early".into(),
+        ImageError::Decoding(error) => {
+            std::error::Error::source(error).map_or_else(|| error.to_string(), |e| e.to_string())
+        }
+        other => other.to_string(),
+    };
+    let reason = match reason.split(" while decoding ").next().unwrap_or_default() {
+        early if early.contains("Not enough bytes") || early.contains("EOF") => "the file ends early",
+        other => other,
+    };
+    IoError::from_library("the picture is damaged", reason)
+}
+
 fn decode(bytes: &[u8], format: ImageFormat, limits: &ReadLimits) -> Result<PixelData> {
-    let damaged = |error| IoError::from_library("the picture cannot be decoded", error);
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     let mut decoder_limits = Limits::default();
     decoder_limits.max_image_width = Some(limits.most_side);

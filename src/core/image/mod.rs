@@ -188,10 +188,13 @@ impl ReadLimits {
         }
         let bytes = product(&[width, height, pixel_bytes], "the picture")? as u64;
         let believed = Self::ALWAYS_BELIEVED.max((file_size as u64).saturating_mul(Self::MOST_INFLATION));
-        if bytes > self.most_bytes || bytes > believed {
+        if bytes > self.most_bytes {
+            let most = self.most_bytes;
+            return Err(IoError::new(format!("{width} x {height} pixels need {bytes} bytes; the limit is {most}")));
+        }
+        if bytes > believed {
             return Err(IoError::new(format!(
-                "{width} x {height} pixels need {bytes} bytes; the limit is {} for this file",
-                self.most_bytes.min(believed)
+                "{width} x {height} pixels need {bytes} bytes, which {file_size} bytes of file cannot hold"
             )));
         }
         Ok((width * height) as usize)
@@ -289,7 +292,7 @@ mod tests {
         assert!(check_writable(&folder.0.join("a.jpg")).unwrap_err().message.contains("known are"));
         assert!(check_writable(&folder.0.join("none/a.exr")).unwrap_err().message.contains("does not exist"));
         assert!(read(&folder.0, &ReadLimits::default()).unwrap_err().message.contains("is a folder"));
-        assert!(read(&folder.0.join("a.png"), &ReadLimits::default()).unwrap_err().message.contains("cannot read"));
+        assert!(read(&folder.0.join("a.png"), &ReadLimits::default()).unwrap_err().message.contains("no such file"));
     }
 
     #[test]

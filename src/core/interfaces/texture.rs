@@ -37,6 +37,11 @@ pub trait Texture: Send + Sync {
         self.constant().map(Rgb::max_component)
     }
 
+    /// Smallest value over the texture in any channel, if known.
+    fn minimum(&self) -> Option<f32> {
+        self.constant().map(Rgb::min_component)
+    }
+
     /// Samples texture coordinates in proportion to luminance: `(uv, density per unit area of uv space)`.
     fn sample_position(&self, u2: Vec2) -> Option<(Vec2, f32)> {
         Some((u2, 1.0))

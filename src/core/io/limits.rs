@@ -15,7 +15,7 @@ pub fn declared(count: u64, bytes_each: u64, available: usize, what: &str) -> Re
     match count.checked_mul(bytes_each.max(1)) {
         Some(bytes) if bytes <= available as u64 => Ok(count as usize),
         _ => Err(IoError::new(format!(
-            "declares {count} {what} of at least {bytes_each} bytes, but only {available} bytes are left"
+            "declares {count} {what} of at least {bytes_each} bytes each, but only {available} bytes are left"
         ))),
     }
 }

@@ -35,10 +35,20 @@ impl IoError {
     /// of that: libraries like to append what they read.
     pub fn from_library(what: &str, error: impl std::fmt::Display) -> Self {
         let text = error.to_string();
+        // The number of the operating system tells users nothing.
+        let text = text.split(" (os error").next().unwrap_or_default();
         let line = text.lines().next().unwrap_or_default().trim_end_matches(['.', ':', ' ']);
         let line: String = line.chars().filter(|c| !c.is_control()).take(160).collect();
         IoError { message: format!("{what}: {line}") }
     }
+}
+
+/// What the operating system says, without its number and in lower case.
+pub(crate) fn plain_io_error(error: &std::io::Error) -> String {
+    let text = error.to_string();
+    let text = text.split(" (os error").next().unwrap_or(&text);
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_lowercase().chain(letters).collect())
 }
 
 /// The result of everything in this module.
@@ -49,11 +59,12 @@ pub type Result<T> = std::result::Result<T, IoError>;
 /// # Errors
 /// If the file is missing, a directory or not readable.
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
-    let about = std::fs::metadata(path).map_err(|error| IoError::from_library("cannot read the file", error))?;
+    let failed = |error| IoError::new(plain_io_error(&error));
+    let about = std::fs::metadata(path).map_err(failed)?;
     if !about.is_file() {
         return Err(IoError::new(if about.is_dir() { "is a folder, not a file" } else { "is not a regular file" }));
     }
-    std::fs::read(path).map_err(|error| IoError::from_library("cannot read the file", error))
+    std::fs::read(path).map_err(failed)
 }
 
 #[cfg(test)]

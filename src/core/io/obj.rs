@@ -167,7 +167,7 @@ impl Reader {
                 corners.iter().map(|corner| lookup(corner[2]).map_or(Vec3::ZERO, |i| self.normals[i])).collect();
         }
         if mesh.triangles.is_empty() {
-            return Err(IoError::new("the mesh has no faces"));
+            return Err(IoError::new("the mesh has no faces with three corners or more"));
         }
         mesh.finish()
     }
@@ -355,7 +355,7 @@ mod tests {
         assert_eq!(error("v 0 0 0\nv 0 1e400 0\n"), "line 2: vertex 2 is not finite");
         assert_eq!(error("v 0 0\n"), "line 1: 3 numbers are expected");
         assert_eq!(error(""), "the mesh has no vertices");
-        assert_eq!(error(CORNERS), "the mesh has no faces");
+        assert_eq!(error(CORNERS), "the mesh has no faces with three corners or more");
     }
 
     #[test]

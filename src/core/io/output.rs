@@ -4,7 +4,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use super::{IoError, Result};
+use super::{IoError, Result, plain_io_error};
 
 /// Writes a file under a temporary name in the same folder and renames it when all is written, so that neither a
 /// crash nor a full disk leaves half a file or destroys an existing one.
@@ -13,7 +13,7 @@ use super::{IoError, Result};
 /// If the folder cannot be written to, `write` fails or the disk is full; the temporary file is removed.
 pub fn replace_file(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Result<()>) -> Result<()> {
     let temporary = temporary_name(path)?;
-    let failed = |error| IoError::from_library("cannot write the file", error);
+    let failed = |error| IoError::new(format!("cannot write the file: {}", plain_io_error(&error)));
     let result = File::create(&temporary).map_err(failed).and_then(|file| {
         let mut writer = BufWriter::with_capacity(1 << 16, file);
         write(&mut writer)?;
@@ -37,11 +37,18 @@ pub fn check_replaceable(path: &Path) -> Result<()> {
         return Err(IoError::new("cannot write: the path is a folder"));
     }
     if path.exists() {
-        OpenOptions::new().append(true).open(path).map_err(|error| IoError::from_library("cannot write", error))?;
+        if !path.is_file() {
+            return Err(IoError::new("cannot write: the path is not a regular file"));
+        }
+        OpenOptions::new()
+            .append(true)
+            .open(path)
+            .map_err(|error| IoError::new(format!("cannot write: {}", plain_io_error(&error))))?;
     }
     let temporary = temporary_name(path)?;
-    File::create(&temporary).map_err(|error| IoError::from_library("cannot write into the folder", error))?;
-    fs::remove_file(&temporary).map_err(|error| IoError::from_library("cannot write into the folder", error))
+    let failed = |error| IoError::new(format!("cannot write into the folder: {}", plain_io_error(&error)));
+    File::create(&temporary).map_err(failed)?;
+    fs::remove_file(&temporary).map_err(failed)
 }
 
 fn temporary_name(path: &Path) -> Result<PathBuf> {

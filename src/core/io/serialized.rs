@@ -70,7 +70,8 @@ fn shape_range(bytes: &[u8], shape_index: usize, version: u16) -> Result<(usize,
     let Some((body, count)) = bytes.split_last_chunk::<4>() else {
         return Err(IoError::new("the file ends before the table of shapes"));
     };
-    let count = declared(u32::from_le_bytes(*count).into(), width as u64, body.len(), "shapes in its table")?;
+    let count = declared(u32::from_le_bytes(*count).into(), width as u64, body.len(), "shapes")
+        .map_err(|error| IoError::new(format!("the table at the end {}: is the file complete?", error.message)))?;
     if shape_index >= count {
         return Err(IoError::new(format!("shape {shape_index} does not exist, the file has {count} (from 0)")));
     }

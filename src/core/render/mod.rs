@@ -66,17 +66,25 @@ impl<'a> RenderContext<'a> {
         control: &'a Control<'a>,
         aovs: Vec<String>,
     ) -> Self {
-        let film = camera.film.settings().clone();
-        let store = FilmStore::new(film.crop_size, aovs);
+        let film = camera.film.settings();
+        Self::of_window(scene, camera, (film.crop_offset, film.crop_size), budget, seed, control, aovs)
+    }
+
+    /// As [`new`](Self::new), for the part of the film that has this offset and size.
+    pub fn of_window(
+        scene: &'a Scene,
+        camera: &'a BuiltSensor,
+        (crop_offset, crop_size): (UVec2, UVec2),
+        budget: Budget,
+        seed: u32,
+        control: &'a Control<'a>,
+        aovs: Vec<String>,
+    ) -> Self {
+        let film = FilmSettings { crop_offset, crop_size, ..camera.film.settings().clone() };
+        let store = FilmStore::new(crop_size, aovs);
         let seed = seed.wrapping_add(camera.sampler.seed());
         let (sensor, sampler) = (&*camera.sensor, &*camera.sampler);
         RenderContext { scene, sensor, film, sampler, budget, seed, order: SampleOrder::PerSample, control, store }
-    }
-
-    /// Renders a part of the film only.
-    pub fn crop(&mut self, offset: UVec2, size: UVec2) {
-        (self.film.crop_offset, self.film.crop_size) = (offset, size);
-        self.store = FilmStore::new(size, self.store.aovs().to_vec());
     }
 
     /// The window that is sampled: the crop window, and a border if the film asks for one.

@@ -2,7 +2,7 @@
 //! scene are found in one run.
 
 use super::description::{Description, Node, NodeId, ObjectKind, Parameter, Value};
-use super::error::{SceneError, did_you_mean};
+use super::error::{Location, SceneError, did_you_mean};
 use super::param::{Default, Param, ParamType, Slot};
 use super::registry::{Plugin, Registry};
 use std::collections::HashSet;
@@ -98,6 +98,10 @@ impl Checker<'_> {
             }
             None => self.unknown_plugin(node),
         }
+        // What is in an object of a kind that is not built does not matter.
+        if is_of_media(node.kind) && table.is_none() {
+            return;
+        }
         for (_, child) in description.children(id) {
             self.object(child);
         }
@@ -111,6 +115,9 @@ impl Checker<'_> {
 
     fn unknown_plugin(&mut self, node: &Node) {
         let (kind, name) = (node.kind, node.plugin.as_str());
+        if is_of_media(kind) && self.registry.of_kind(kind).next().is_none() {
+            return self.report(node, no_media(kind, &node.at));
+        }
         let mut error = SceneError::at(&node.at, format!("unknown {} plugin \"{name}\"", kind.tag()));
         let elsewhere = self.registry.all().find(|p| p.name == name).map(|p| p.build.kind());
         let names = self.registry.of_kind(kind).flat_map(|p| std::iter::once(p.name).chain(p.aliases.iter().copied()));
@@ -118,13 +125,22 @@ impl Checker<'_> {
             error = error.hint(format!("\"{name}\" is of kind {}, not {}", other.tag(), kind.tag()));
         } else if let Some(meant) = did_you_mean(name, names) {
             error = error.hint(format!("did you mean \"{meant}\"?"));
-        } else if matches!(kind, ObjectKind::Medium | ObjectKind::Phase | ObjectKind::Volume) {
-            error = error.hint("participating media are not built yet");
         } else {
             error = error.hint(format!("`lucerna plugins {}` lists what there is", kind.tag()));
         }
         error.chain.extend(node.included_from.iter().cloned());
         self.found.errors.push(error);
+    }
+
+    /// Complains about a file that is not there, so that all of them are told in one run.
+    fn file(&mut self, node: &Node, parameter: &Parameter) {
+        let Value::String(name) = &parameter.value else { return };
+        let error = match self.description.locate(name) {
+            Ok(path) if path.is_dir() => SceneError::at(&parameter.at, format!("\"{name}\" is a folder, not a file")),
+            Ok(_) => return,
+            Err(why) => SceneError::at(&parameter.at, format!("could not open the file \"{name}\"")).hint(why),
+        };
+        self.report(node, error);
     }
 
     fn parameter(&mut self, node: &Node, table: Table<'_>, parameter: &Parameter) {
@@ -137,6 +153,8 @@ impl Checker<'_> {
         };
         if let Some(message) = mismatch(spec, &parameter.value) {
             self.report(node, SceneError::at(&parameter.at, message));
+        } else if spec.ty == ParamType::File && !self.lenient {
+            self.file(node, parameter);
         }
     }
 
@@ -154,21 +172,24 @@ impl Checker<'_> {
             },
             Some(_) => false,
         };
-        if fits {
+        // Media are complained about once, where they stand.
+        if fits || (is_of_media(kind) && self.registry.of_kind(kind).next().is_none()) {
             return;
         }
+        let is_slot = named.is_some_and(|spec| !matches!(spec.ty, ParamType::Child(..)));
         let message = match named {
-            Some(spec) if !matches!(spec.ty, ParamType::Child(..)) => {
-                format!("\"{}\" must be a {}, not a {}", spec.name, spec.type_text(), kind.tag())
+            Some(spec) if is_slot => {
+                format!(
+                    "\"{}\" must be {}, not {}",
+                    spec.name,
+                    with_article(&spec.type_text()),
+                    with_article(kind.tag())
+                )
             }
-            _ => format!("a {} has no place here", kind.tag()),
+            _ => format!("{} has no place here", with_article(kind.tag())),
         };
         let error = SceneError::at(&parameter.at, message);
-        let error = match kind {
-            ObjectKind::Medium => error.hint("participating media are not built yet"),
-            _ => error.hint(accepted_children(table)),
-        };
-        self.report(node, error);
+        self.report(node, if is_slot { error } else { error.hint(accepted_children(self.registry, table)) });
     }
 
     fn unknown_parameter(&mut self, node: &Node, table: Table<'_>, parameter: &Parameter) {
@@ -224,10 +245,30 @@ impl Checker<'_> {
     }
 }
 
-fn accepted_children(table: Table<'_>) -> String {
+/// Kinds that belong to participating media.
+fn is_of_media(kind: ObjectKind) -> bool {
+    matches!(kind, ObjectKind::Medium | ObjectKind::Phase | ObjectKind::Volume)
+}
+
+fn no_media(kind: ObjectKind, at: &Location) -> SceneError {
+    SceneError::at(at, "participating media are not built yet").hint(format!("remove the <{}>", kind.tag()))
+}
+
+/// `an emitter`, `a shape`; words such as `one of …` need no article.
+fn with_article(noun: &str) -> String {
+    match noun.chars().next() {
+        _ if noun.starts_with("one ") || noun.starts_with("anything") => noun.to_owned(),
+        Some('a' | 'e' | 'i' | 'o') => format!("an {noun}"),
+        _ => format!("a {noun}"),
+    }
+}
+
+fn accepted_children(registry: &Registry, table: Table<'_>) -> String {
     let kinds: Vec<&str> = table
         .params()
-        .filter_map(|p| if let ParamType::Child(kind, ..) = p.ty { Some(kind.tag()) } else { None })
+        .filter_map(|p| if let ParamType::Child(kind, ..) = p.ty { Some(kind) } else { None })
+        .filter(|kind| *kind == ObjectKind::Scene || registry.of_kind(*kind).next().is_some())
+        .map(ObjectKind::tag)
         .collect();
     match kinds.as_slice() {
         [] => "nothing can be nested here".to_owned(),
@@ -286,7 +327,7 @@ fn mismatch(spec: &Param, value: &Value) -> Option<String> {
     {
         return match slot {
             Slot::Reflectance if components.iter().any(|v| !(0.0..=1.0).contains(v)) => {
-                Some(format!("\"{name}\" is a reflectance and must be in [0, 1], got {}", join(&components)))
+                Some(format!("\"{name}\" must be from 0 to 1, got {}", join(&components)))
             }
             // Indices of refraction fitted to RGB may be negative in a channel; real scenes have such metals.
             Slot::Emissive if components.iter().any(|v| *v < 0.0) => {

@@ -25,6 +25,14 @@ impl Texture for Clamped {
         self.0.mean().clamp(0.0, 1.0)
     }
 
+    fn constant(&self) -> Option<Rgb> {
+        self.0.constant().map(|color| color.map(|v| v.clamp(0.0, 1.0)))
+    }
+
+    fn minimum(&self) -> Option<f32> {
+        self.0.minimum().map(|v| v.clamp(0.0, 1.0))
+    }
+
     fn maximum(&self) -> Option<f32> {
         Some(1.0)
     }

@@ -5,6 +5,7 @@
 //! [`NodeId`], so that a material used by a thousand shapes is one node.
 
 use super::error::Location;
+use crate::io::plain_io_error;
 use glam::DMat4;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -288,6 +289,9 @@ impl Description {
     /// Finds an existing file as [`find_file`](Self::find_file) does, or says why there is none to be had: a hint
     /// for an error message.
     pub fn locate(&self, name: &str) -> Result<PathBuf, String> {
+        if name.is_empty() {
+            return Err("the file name is empty".to_owned());
+        }
         let path = Path::new(name);
         let found = if path.is_absolute() {
             path.exists().then(|| path.to_owned())
@@ -315,12 +319,4 @@ impl Description {
             Err(format!("files outside of \"{}\" are refused", root.display()))
         }
     }
-}
-
-/// What an I/O error says, without the number of the operating system.
-pub(crate) fn plain_io_error(error: &std::io::Error) -> String {
-    let text = error.to_string();
-    let text = text.split(" (os error").next().unwrap_or(&text);
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_lowercase().chain(letters).collect())
 }

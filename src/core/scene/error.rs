@@ -1,5 +1,6 @@
 //! The one error type of scene loading: where, what, and what to do about it.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::sync::Arc;
 
@@ -71,21 +72,41 @@ impl SceneError {
 
 impl fmt::Display for SceneError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut line = String::new();
         if let Some(at) = &self.at {
-            write!(f, "{at}: ")?;
+            line += &format!("{at}: ");
         }
-        write!(f, "{}", self.message)?;
+        line += &shortened(&self.message, LONGEST_MESSAGE);
         if let Some(hint) = &self.hint {
-            write!(f, " ({hint})")?;
+            line += &format!(" ({hint})");
         }
         for link in &self.chain {
-            write!(f, ", {link}")?;
+            line += &format!(", {link}");
         }
-        Ok(())
+        f.write_str(&one_line(&line))
     }
 }
 
 impl std::error::Error for SceneError {}
+
+/// Letters of a message that are shown at most; a list of includes may be long.
+const LONGEST_MESSAGE: usize = 4000;
+
+/// A text of at most `longest` letters: of a longer one the middle is left out.
+pub fn shortened(text: &str, longest: usize) -> Cow<'_, str> {
+    let count = text.chars().count();
+    if count <= longest {
+        return text.into();
+    }
+    let start: String = text.chars().take(longest * 2 / 3).collect();
+    let end: String = text.chars().skip(count - longest / 3).collect();
+    format!("{start} … {end}").into()
+}
+
+/// A text from a file as one line that does nothing to a terminal: control characters become `?`.
+pub fn one_line(text: &str) -> Cow<'_, str> {
+    if text.contains(char::is_control) { text.replace(char::is_control, "?").into() } else { text.into() }
+}
 
 /// All that is wrong with a scene, in file order as far as it could be found out in one go. Never empty.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -113,14 +134,16 @@ impl std::error::Error for SceneErrors {}
 
 /// The candidate nearest to `word` by edit distance, if it is near enough to be what was meant.
 ///
-/// At most a third of the letters may differ, and letter case and underscores do not count.
+/// At most a third of the letters (rounded) and not all may differ; letter case and underscores do not count.
 pub fn did_you_mean<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let plain = |s: &str| s.chars().filter(|c| *c != '_').flat_map(char::to_lowercase).collect::<Vec<_>>();
     let word = plain(word);
     candidates
         .into_iter()
         .map(|candidate| (edit_distance(&word, &plain(candidate)), candidate))
-        .filter(|(distance, candidate)| *distance <= 1.max(candidate.len().min(word.len()) / 3))
+        .filter(|(distance, candidate)| {
+            *distance <= 1.max((candidate.len().max(word.len()) + 1) / 3) && *distance < word.len()
+        })
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, candidate)| candidate)
 }
@@ -152,8 +175,19 @@ mod tests {
         assert_eq!(did_you_mean("radianse", ["radiance", "scale"]), Some("radiance"));
         assert_eq!(did_you_mean("toWorld", ["to_world", "to_uv"]), Some("to_world"));
         assert_eq!(did_you_mean("difuse", ["diffuse", "plastic"]), Some("diffuse"));
+        assert_eq!(did_you_mean("alfa", ["alpha", "eta"]), Some("alpha"));
+        assert_eq!(did_you_mean("disk", ["mask", "box"]), None);
+        assert_eq!(did_you_mean("z", ["x", "y"]), None);
         assert_eq!(did_you_mean("zzz", ["diffuse", "plastic"]), None);
         assert_eq!(edit_distance(&['a', 'b'], &['b', 'a']), 1);
+    }
+
+    #[test]
+    fn long_texts_and_control_characters_are_not_repeated() {
+        assert_eq!(shortened("abcdefghi", 9), "abcdefghi");
+        assert_eq!(shortened("abcdefghij", 9), "abcdef … hij");
+        let error = SceneError::at(&Location::file("a\nb.xml"), "bad \u{1b}[31m");
+        assert_eq!(error.to_string(), "a?b.xml: bad ?[31m");
     }
 
     #[test]

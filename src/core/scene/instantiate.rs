@@ -12,6 +12,7 @@ use super::registry::{Built, Constructor, Failed, Plugin, Registry};
 use super::world::{EmitterSource, Scene};
 use crate::accel::Geometry;
 use crate::interfaces::{Emitter, EmitterFlags, Shape};
+use crate::math::Aabb;
 use rayon::prelude::*;
 use std::cell::{Cell, RefCell};
 use std::sync::{Arc, Mutex, OnceLock};
@@ -271,6 +272,12 @@ impl<'a> Builder<'a> {
     /// A shape with its material and light.
     fn build_shape(&self, id: NodeId, shape: Built<dyn Shape>, properties: &Properties<'_>) -> Result<Object, Failed> {
         let shape = shape?;
+        if let Geometry::Analytic(primitive) = shape.geometry()
+            && primitive.bounds() != Aabb::EMPTY
+            && !primitive.bounds().is_finite()
+        {
+            return Err(properties.error("", "the shape reaches beyond the largest number of single precision"));
+        }
         let bsdf = properties.bsdfs().into_iter().next().ok_or(Failed)?;
         let emitter = self
             .description

@@ -88,14 +88,23 @@ impl<'a> Properties<'a> {
     /// Tells an error about a parameter (at its position, or the object's if it is not set).
     pub fn error(&self, name: &str, message: impl Into<String>) -> Failed {
         let at = self.node.parameter(name).map_or(&self.node.at, |p| &p.at);
-        self.errors.borrow_mut().push(SceneError::at(at, message));
+        let error = SceneError::at(at, message);
+        let mut errors = self.errors.borrow_mut();
+        // A constructor may read a parameter twice.
+        if !errors.contains(&error) {
+            errors.push(error);
+        }
         Failed
     }
 
     /// Tells the user about something odd that does not stop the render.
     pub fn warn(&self, name: &str, message: impl Into<String>) {
         let at = self.node.parameter(name).map_or(&self.node.at, |p| &p.at);
-        self.warnings.borrow_mut().push(format!("{at}: {}", message.into()));
+        let warning = format!("{at}: {}", message.into());
+        let mut warnings = self.warnings.borrow_mut();
+        if !warnings.contains(&warning) {
+            warnings.push(warning);
+        }
     }
 
     /// Two parameters of which at most one may be set.
@@ -185,9 +194,11 @@ impl<'a> Properties<'a> {
             Ok(path) => Ok(path),
             Err(why) => {
                 self.missing_file.set(true);
-                let at = self.node.parameter(name).map_or(&self.node.at, |p| &p.at);
-                self.errors.borrow_mut().push(SceneError::at(at, format!("file \"{text}\" not found")).hint(why));
-                Err(Failed)
+                let failed = self.error(name, format!("could not open the file \"{text}\""));
+                if let Some(error) = self.errors.borrow_mut().last_mut() {
+                    error.hint = Some(why);
+                }
+                Err(failed)
             }
         }
     }
@@ -218,7 +229,7 @@ impl<'a> Properties<'a> {
     /// A transform with its inverse; identity if not set. A singular one is an error.
     pub fn transform(&self, name: &str) -> Result<Transform, Failed> {
         Transform::new(self.matrix(name))
-            .ok_or_else(|| self.error(name, format!("\"{name}\" is singular: it flattens the scene or is not affine")))
+            .ok_or_else(|| self.error(name, format!("\"{name}\" is singular: it flattens the object or is not affine")))
     }
 
     /// A constant colour, if set or with a default.
@@ -246,8 +257,10 @@ impl<'a> Properties<'a> {
         if let Some(texture) = self.texture_in(name) {
             return Some(match (texture.spectrum(), texture.constant()) {
                 (Some(spectrum), _) => ColorSource::Constant(self.spectrum_color(name, spectrum, slot)),
-                (None, Some(color)) => ColorSource::Constant(color),
-                (None, None) => ColorSource::Textured(self.bounded(name, texture, slot)),
+                (None, constant) => match (self.bounded(name, texture, slot), constant) {
+                    (texture, Some(_)) => ColorSource::Constant(texture.constant().unwrap_or_default()),
+                    (texture, None) => ColorSource::Textured(texture),
+                },
             });
         }
         let constant = match (self.value(name), spec.default) {
@@ -298,8 +311,11 @@ impl<'a> Properties<'a> {
         color
     }
 
-    /// A reflectance above 1 would make light out of nothing: it is clamped.
+    /// A reflectance above 1 would make light out of nothing: it is clamped. Nothing may be negative.
     fn bounded(&self, name: &str, texture: Arc<dyn Texture>, slot: Slot) -> Arc<dyn Texture> {
+        if let Some(min) = texture.minimum().filter(|min| *min < 0.0) {
+            self.error(name, format!("the texture of \"{name}\" falls to {min}, but must not be negative"));
+        }
         match texture.maximum() {
             Some(max) if max > 1.0 && slot == Slot::Reflectance => {
                 self.warn(name, format!("the texture of \"{name}\" reaches {max} and is clamped to 1"));

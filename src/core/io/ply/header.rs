@@ -60,6 +60,9 @@ const MOST_LINES: usize = 4096;
 /// # Errors
 /// With the line.
 pub(super) fn read(bytes: &[u8]) -> Result<Header> {
+    if !bytes.starts_with(b"ply") {
+        return Err(IoError::new("is not a PLY file: it does not begin with \"ply\""));
+    }
     let (mut clean, mut lines, mut length, mut declarations) = (String::new(), 0, 0, 0);
     let mut ended = false;
     while !ended {
@@ -82,13 +85,23 @@ pub(super) fn read(bytes: &[u8]) -> Result<Header> {
     }
     let header = Parser::<DefaultElement>::new()
         .read_header(&mut Reader::new(clean.as_bytes()))
-        .map_err(|error| IoError::from_library("the header cannot be read", error))?;
+        .map_err(|error| IoError::new(not_understood(&error.to_string())))?;
     let elements: Vec<Element> = header.elements.into_values().map(element).collect::<Result<_>>()?;
     // The crate keeps only the last of several of the same name, after which all data would be misread.
     if elements.iter().map(|element| 1 + element.properties.len()).sum::<usize>() != declarations {
         return Err(IoError::new("the header declares an element or a property twice"));
     }
     Ok(Header { encoding: header.encoding, elements, lines, length })
+}
+
+/// What is wrong with a header by what the crate says, which begins with the line but knows no reasons.
+fn not_understood(error: &str) -> String {
+    match error.strip_prefix("Line ").and_then(|rest| rest.split(':').next()) {
+        Some("1") => "line 1: there is more than \"ply\"".to_owned(),
+        Some("2") => "line 2: the format is not ascii, binary_little_endian or binary_big_endian 1.0".to_owned(),
+        Some(line) => format!("line {line}: neither an element with its count nor a property of a known type"),
+        None => "the header is damaged".to_owned(),
+    }
 }
 
 fn element(definition: ply_rs_bw::ply::ElementDef) -> Result<Element> {

@@ -347,7 +347,10 @@ mod tests {
         assert_eq!(faces("3 0 1 2\n3 0 1 4"), "face 1 (from 0): index 4 is out of range, there are 4");
         assert_eq!(faces("3 0 1 -1"), "face 0 (from 0): index -1 is out of range, there are 4");
         assert_eq!(faces("2 0 1"), "face 0 (from 0) has only 2 corners");
-        assert_eq!(faces("3 0 1"), "line 14: declares 3 list entries of at least 2 bytes, but only 4 bytes are left");
+        assert_eq!(
+            faces("3 0 1"),
+            "line 14: declares 3 list entries of at least 2 bytes each, but only 4 bytes are left"
+        );
         assert_eq!(faces("3 0 1 x"), "line 14: no number for \"vertex_indices\"");
         assert!(faces("200 0 1 2").starts_with("line 14: declares 200"));
         assert!(faces("-3 0 1 2").starts_with("line 14: "));
@@ -357,8 +360,9 @@ mod tests {
         assert_eq!(error(ascii(XYZ, &nan.replace("nan", "one"), LIST, "3 0 1 2")), "line 11: no number for \"x\"");
         assert!(error(ascii("float x, float y", "0 0", LIST, "3 0 0 0")).contains("no x, y and z"));
         assert!(error(ascii("float x, float y, float x", "0 0 0", LIST, "3 0 0 0")).contains("twice"));
-        assert_eq!(error(""), "line 1: the header has no end_header");
-        assert!(error("ply\nformat ascii 1.0\nelement vertex -4\nend_header\n").contains("Line 3"));
+        assert_eq!(error(""), "is not a PLY file: it does not begin with \"ply\"");
+        assert_eq!(error("ply\n"), "line 2: the header has no end_header");
+        assert!(error("ply\nformat ascii 1.0\nelement vertex -4\nend_header\n").starts_with("line 3: neither"));
         let file = String::from_utf8_lossy(&binary(false, false)).into_owned();
         for count in ["4000000000", "18446744073709551615"] {
             let huge = file.replace("vertex 4", &format!("vertex {count}"));

@@ -48,13 +48,18 @@ impl<'a> Rows<'a> {
 
     /// Checks the number of rows that an element declares against the bytes left.
     pub fn count(&self, element: &Element) -> Result<usize> {
+        let what = match element.name.as_str() {
+            "vertex" => "vertices",
+            "face" => "faces",
+            _ => "rows of another element",
+        };
         match self {
             // One digit per number and something behind each but the last of the file.
             Rows::Ascii { rest, .. } => {
-                declared(element.count, 2 * element.properties.len() as u64, rest.len() + 1, &element.name)
+                declared(element.count, 2 * element.properties.len() as u64, rest.len() + 1, what)
             }
             Rows::Binary { cursor, .. } => {
-                declared(element.count, element.smallest_row() as u64, cursor.rest().len(), &element.name)
+                declared(element.count, element.smallest_row() as u64, cursor.rest().len(), what)
             }
         }
     }

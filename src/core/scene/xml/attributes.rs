@@ -13,6 +13,8 @@ const MOST: usize = 64;
 pub(super) struct Attributes {
     /// The element's name.
     pub tag: String,
+    /// Whether an attribute has no usable value, which has been complained about.
+    pub broken: bool,
     list: Vec<(String, String)>,
 }
 
@@ -21,7 +23,7 @@ impl Attributes {
     /// Namespace declarations are skipped.
     pub fn read(element: &BytesStart, definitions: &mut Definitions) -> (Self, Vec<(String, Option<String>)>) {
         let tag = element.name().into_inner().to_owned();
-        let mut attributes = Attributes { tag, list: Vec::new() };
+        let mut attributes = Attributes { tag, broken: false, list: Vec::new() };
         let mut wrong = Vec::new();
         for attribute in element.attributes().with_checks(false) {
             match attribute {
@@ -36,14 +38,15 @@ impl Attributes {
                     }
                     let value = match attribute.normalized_value(XmlVersion::Implicit1_0) {
                         Ok(value) => definitions.substitute(&value),
-                        Err(error) => Err((
-                            format!("attribute \"{name}\" of element <{}> is malformed: {error}", attributes.tag),
+                        Err(_) => Err(Some((
+                            format!("\"&\" begins no entity in attribute \"{name}\" of element <{}>", attributes.tag),
                             Some("a plain & is written &amp;".to_owned()),
-                        )),
+                        ))),
                     };
                     // A broken value still counts as given, so that one mistake makes one message.
                     let value = value.unwrap_or_else(|error| {
-                        wrong.push(error);
+                        wrong.extend(error);
+                        attributes.broken = true;
                         String::new()
                     });
                     attributes.list.push((name.to_owned(), value));
@@ -80,7 +83,7 @@ impl Attributes {
     #[cfg(test)]
     pub fn from_list(tag: &str, list: &[(&str, &str)]) -> Self {
         let list = list.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
-        Attributes { tag: tag.to_owned(), list }
+        Attributes { tag: tag.to_owned(), broken: false, list }
     }
 }
 

@@ -134,12 +134,13 @@ impl Loader<'_> {
     }
 
     fn read_file(&mut self, path: &Path) -> Option<NodeId> {
-        let name: Arc<str> = path.strip_prefix(".").unwrap_or(path).display().to_string().into();
+        let plain = path.strip_prefix(".").ok().filter(|rest| !rest.as_os_str().is_empty()).unwrap_or(path);
+        let name: Arc<str> = plain.display().to_string().into();
         let whole_file = Location::file(Arc::clone(&name));
         let text = self
             .description
             .check_confinement(path)
-            .and_then(|()| std::fs::read(path).map_err(|error| crate::scene::description::plain_io_error(&error)))
+            .and_then(|()| crate::io::read_bytes(path).map_err(|error| error.message))
             .map_err(|reason| SceneError::at(&whole_file, "could not read the file").hint(reason))
             .and_then(|bytes| source::decode(&bytes, &name));
         match text {
@@ -159,6 +160,8 @@ impl Loader<'_> {
     }
 
     fn read_text(&mut self, text: &str, name: Arc<str>, folder: &Path) -> Option<NodeId> {
+        // The XML reader would skip byte order marks without counting them.
+        let text = text.trim_start_matches('\u{feff}');
         let mut parser = FileParser::new(self, name, folder);
         match parser.run(text) {
             Ok(root) => Some(root),
@@ -204,7 +207,10 @@ impl Loader<'_> {
     fn check_definitions(&mut self) {
         for (name, value, meant) in self.definitions.unused() {
             let mut error = SceneError::anywhere(format!("unused parameter: ${name}={value}"));
-            error.hint = meant.map(|meant| format!("did you mean \"{meant}\"?"));
+            error.hint = Some(match meant {
+                Some(meant) => format!("did you mean \"{meant}\"?"),
+                None => format!("nothing in the scene refers to ${name}"),
+            });
             match self.options.lenient {
                 true => self.description.warnings.push(error.to_string()),
                 false => self.errors.push(error),

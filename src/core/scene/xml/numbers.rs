@@ -3,8 +3,16 @@
 //! Stricter than the reference, which takes `nan`, `inf`, `1e400` and the empty string for numbers: whatever is read
 //! here is finite, also after rounding to single precision.
 
+use crate::scene::error::shortened;
+use std::borrow::Cow;
+
 /// What is wrong with a value: a message and, where there is one, a way out.
 pub(super) type Wrong = (String, Option<&'static str>);
+
+/// A value as messages show it.
+pub(super) fn shown(text: &str) -> Cow<'_, str> {
+    shortened(text, 60)
+}
 
 /// The parts of a list: separated by blanks and commas, any number of them.
 pub(super) fn items(text: &str) -> impl Iterator<Item = &str> {
@@ -14,12 +22,16 @@ pub(super) fn items(text: &str) -> impl Iterator<Item = &str> {
 /// A finite decimal number; blanks around it do not matter.
 pub(super) fn float(text: &str) -> Result<f64, Wrong> {
     let number = text.trim_matches(|c: char| c.is_ascii_whitespace());
-    let wrong = |hint| Err((format!("could not parse floating point value \"{text}\""), hint));
+    let wrong = |hint| Err((format!("could not parse floating point value \"{}\"", shown(text)), hint));
     if !is_decimal(number) {
         return wrong(match number.to_ascii_lowercase().trim_start_matches(['+', '-']) {
             "nan" | "inf" | "infinity" => Some("only finite numbers are allowed"),
-            "" => Some("the value is empty"),
-            _ => None,
+            "" if number.is_empty() => Some("the value is empty"),
+            other if other.starts_with("0x") => Some("only decimal numbers are allowed"),
+            _ if items(number).count() > 1 && items(number).all(is_decimal) => {
+                Some("one number is needed, with a point before its fraction")
+            }
+            _ => Some("a number such as 0.5 or 1e-3 is needed"),
         });
     }
     match number.parse::<f64>() {
@@ -44,8 +56,14 @@ fn is_decimal(text: &str) -> bool {
 /// A whole number of 64 bits; blanks around it do not matter.
 pub(super) fn integer(text: &str) -> Result<i64, Wrong> {
     text.trim_matches(|c: char| c.is_ascii_whitespace()).parse().map_err(|_| {
-        let hint = float(text).is_ok().then_some("a whole number is needed");
-        (format!("could not parse integer value \"{text}\""), hint)
+        let number = text.trim_matches(|c: char| c.is_ascii_whitespace());
+        let digits = number.strip_prefix(['+', '-']).unwrap_or(number);
+        let hint = match digits {
+            "" if number.is_empty() => "the value is empty",
+            _ if !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit()) => "the number is too large",
+            _ => "a whole number is needed",
+        };
+        (format!("could not parse integer value \"{}\"", shown(text)), Some(hint))
     })
 }
 
@@ -54,7 +72,7 @@ pub(super) fn boolean(text: &str) -> Result<bool, Wrong> {
     match text.trim_matches(|c: char| c.is_ascii_whitespace()).to_ascii_lowercase().as_str() {
         "true" => Ok(true),
         "false" => Ok(false),
-        _ => Err((format!("could not parse boolean value \"{text}\""), Some("must be \"true\" or \"false\""))),
+        _ => Err((format!("could not parse boolean value \"{}\"", shown(text)), Some("must be \"true\" or \"false\""))),
     }
 }
 
@@ -68,7 +86,10 @@ pub(super) fn triple(text: &str, what: &str) -> Result<[f64; 3], Wrong> {
     match floats(text)?[..] {
         [x] => Ok([x; 3]),
         [x, y, z] => Ok([x, y, z]),
-        _ => Err((format!("could not parse {what} value \"{text}\""), Some("one or three numbers are needed"))),
+        _ => {
+            let message = format!("could not parse {what} value \"{}\"", shown(text));
+            Err((message, Some("one or three numbers are needed")))
+        }
     }
 }
 
@@ -77,7 +98,7 @@ pub(super) fn spectrum_table(text: &str) -> Result<Vec<(f64, f64)>, Wrong> {
     let pairs = items(text).map(|item| match item.split_once(':') {
         Some((wavelength, value)) => Ok((float(wavelength)?, float(value)?)),
         None => Err((
-            format!("could not parse spectrum value \"{text}\""),
+            format!("could not parse spectrum value \"{}\"", shown(text)),
             Some("give one number, or pairs such as \"400:0.1, 700:0.5\"; a colour is an <rgb>"),
         )),
     });
@@ -92,10 +113,14 @@ pub(super) fn spectrum_file(text: &str) -> Result<Vec<(f64, f64)>, (u32, Wrong)>
     let mut table = Vec::new();
     for (number, line) in (1..).zip(text.lines()) {
         let content = line.split('#').next().unwrap_or_default();
-        match floats(content).map_err(|wrong| (number, wrong))?[..] {
-            [] => {}
-            [wavelength, value] => table.push((wavelength, value)),
-            _ => return Err((number, ("a line of a spectrum file holds a wavelength and a value".to_owned(), None))),
+        // The content is not repeated: any file can be named as a spectrum.
+        match floats(content).as_deref() {
+            Ok([]) => {}
+            Ok(&[wavelength, value]) => table.push((wavelength, value)),
+            _ => {
+                let message = "a line of a spectrum file holds a wavelength and a value, both finite numbers";
+                return Err((number, (message.to_owned(), None)));
+            }
         }
     }
     increasing(table).map_err(|wrong| (0, wrong))
@@ -130,20 +155,23 @@ mod tests {
     #[test]
     fn hc_i07_bad_numbers() {
         let finite = Some("only finite numbers are allowed");
+        let one = Some("one number is needed, with a point before its fraction");
+        let such = Some("a number such as 0.5 or 1e-3 is needed");
         for (text, hint) in [
             ("nan", finite),
             ("-inf", finite),
             ("1e400", Some("the number is too large")),
             ("1e39", Some("the number is too large")),
             ("", Some("the value is empty")),
-            ("0x10", None),
-            ("1,5", None),
-            ("1 2", None),
-            ("1f", None),
-            (".", None),
-            ("1e", None),
-            ("--1", None),
-            ("1.2.3", None),
+            ("0x10", Some("only decimal numbers are allowed")),
+            ("1,5", one),
+            ("1 2", one),
+            ("1f", such),
+            (".", such),
+            ("-", such),
+            ("1e", such),
+            ("--1", such),
+            ("1.2.3", such),
         ] {
             assert_eq!(float(text), Err((format!("could not parse floating point value \"{text}\""), hint)));
         }

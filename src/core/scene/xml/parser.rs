@@ -96,7 +96,9 @@ impl<'l, 'o> FileParser<'l, 'o> {
         if let Some((tag, at)) = self.opened.pop() {
             return Err(fatal(&at, format!("the file is malformed: <{tag}> is never closed")));
         }
-        self.root.ok_or_else(|| fatal(&Location::file(Arc::clone(&self.file)), "the file has no elements".to_owned()))
+        self.root.ok_or_else(|| {
+            fatal(&Location::file(Arc::clone(&self.file)), "the file has no elements: it is no scene".to_owned())
+        })
     }
 
     fn malformed(&self, error: &Error) -> String {
@@ -234,8 +236,13 @@ impl<'l, 'o> FileParser<'l, 'o> {
         let (message, hint) = if transform::OPERATIONS.contains(&tag) {
             (format!("transform operation <{tag}> can only appear inside a <transform> tag"), None)
         } else {
+            let today = match tag {
+                "camera" => Some("sensor"),
+                "luminaire" => Some("emitter"),
+                _ => None,
+            };
             let known = ObjectKind::ALL.iter().map(|kind| kind.tag()).chain(PROPERTIES).chain(DIRECTIVES);
-            let meant = did_you_mean(tag, known).map(|meant| format!("did you mean <{meant}>?"));
+            let meant = today.or_else(|| did_you_mean(tag, known)).map(|meant| format!("did you mean <{meant}>?"));
             (format!("encountered an unsupported XML element: <{tag}>"), meant)
         };
         if self.loader.options.lenient {
@@ -350,6 +357,9 @@ impl<'l, 'o> FileParser<'l, 'o> {
                 None => return,
             },
         };
+        if attributes.broken {
+            return self.reserve(name, at);
+        }
         match property::value(attributes, self.version, &self.loader.description) {
             Ok((value, note)) => {
                 if let Some(note) = note {
@@ -394,6 +404,9 @@ impl<'l, 'o> FileParser<'l, 'o> {
             return Frame::Skipped;
         }
         self.expect(attributes, transform::allowed(tag), at);
+        if attributes.broken {
+            return Frame::Leaf(tag.to_owned());
+        }
         match transform::operation(tag, attributes) {
             Ok(step) => {
                 if let Some(Frame::Transform { matrix, .. }) = self.stack.last_mut() {
@@ -413,12 +426,17 @@ impl<'l, 'o> FileParser<'l, 'o> {
             if name.is_empty() {
                 return self.wrong(at, ("a parameter needs a name".to_owned(), None));
             }
-            self.loader.definitions.default_value(name.to_owned(), value.to_owned());
+            let value = Some(value.to_owned()).filter(|_| !attributes.broken);
+            self.loader.definitions.default_value(name.to_owned(), value);
         }
     }
 
     fn include(&mut self, attributes: &Attributes, at: &Location) {
         self.expect(attributes, &["filename", "name"], at);
+        if attributes.broken {
+            self.loader.gave_up = true;
+            return;
+        }
         let Some(filename) = self.required(attributes, "filename", at) else { return };
         let folder = self.folder.clone();
         let Some(root) = self.loader.include(filename, &folder, at) else { return };
@@ -439,6 +457,9 @@ impl<'l, 'o> FileParser<'l, 'o> {
 
     fn path(&mut self, attributes: &Attributes, at: &Location) {
         self.expect(attributes, &["value"], at);
+        if attributes.broken {
+            return;
+        }
         if self.stack.len() != 1 {
             return self.wrong(at, ("<path> can only stand directly under the root".to_owned(), None));
         }

@@ -72,7 +72,7 @@ fn vector(attributes: &Attributes) -> Result<[f64; 3], Wrong> {
 fn rgb(text: &str) -> Result<[f64; 3], Wrong> {
     if text.trim_start().starts_with('#') {
         let hint = "hexadecimal colours are not allowed; give three numbers from 0 to 1";
-        return Err((format!("could not parse RGB value \"{text}\""), Some(hint)));
+        return Err((format!("could not parse RGB value \"{}\"", numbers::shown(text)), Some(hint)));
     }
     numbers::triple(text, "RGB")
 }
@@ -94,8 +94,8 @@ fn spectrum_file(attributes: &Attributes, description: &Description) -> Result<V
     }
     let unreadable = |reason| (format!("could not read the spectrum file \"{filename}\""), Some(reason));
     let path = description.locate(filename).map_err(unreadable)?;
-    let text = std::fs::read_to_string(&path)
-        .map_err(|error| unreadable(crate::scene::description::plain_io_error(&error)))?;
+    let bytes = crate::io::read_bytes(&path).map_err(|error| unreadable(error.message))?;
+    let text = String::from_utf8(bytes).map_err(|_| unreadable("is not text in UTF-8".to_owned()))?;
     let table = numbers::spectrum_file(&text).map_err(|(line, (message, hint))| {
         let place = if line == 0 { filename.to_owned() } else { format!("{filename}:{line}") };
         (format!("{message}, in {place}"), hint.map(str::to_owned))

@@ -67,6 +67,7 @@ impl<'t> Cursor<'t> {
 
     /// The place of the character at byte `offset`.
     pub fn locate(&mut self, offset: usize) -> Location {
+        let offset = self.text.floor_char_boundary(offset);
         if offset < self.offset {
             (self.offset, self.line, self.column) = (0, 1, 1);
         }

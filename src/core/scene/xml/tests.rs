@@ -153,14 +153,14 @@ fn hc_i01_missing_files() {
     let errors = folder.load("nowhere.xml", &LoadOptions::default()).unwrap_err();
     assert_eq!(errors, ["nowhere.xml: could not read the file (no such file or directory)"]);
     let errors = folder.load("", &LoadOptions::default()).unwrap_err();
-    assert!(errors[0].ends_with("could not read the file (is a directory)"), "{errors:?}");
+    assert!(errors[0].ends_with("could not read the file (is a folder, not a file)"), "{errors:?}");
 }
 
 #[test]
 fn hc_i02_malformed() {
     let cases = [
-        ("", "a.xml: the file has no elements"),
-        ("<!-- x -->", "a.xml: the file has no elements"),
+        ("", "a.xml: the file has no elements: it is no scene"),
+        ("<!-- x -->", "a.xml: the file has no elements: it is no scene"),
         (
             "<scene version='3.0.0'>\n <bsdf type='a'>\n</scene>",
             "a.xml:3:1: the file is malformed: </scene> closes <bsdf> of line 2",
@@ -342,7 +342,10 @@ fn hc_i10_parameters() {
     let text = scene("<default name='spp' value='4'/><sampler type='$spq'/>");
     assert_eq!(messages_of(&text), ["a.xml:1:55: undefined parameter: $spq (did you mean \"$spp\"?)"]);
     let text = scene("<default name='a' value='$a'/>");
-    assert_eq!(messages_of(&text), ["a.xml:1:24: undefined parameter: $a"]);
+    assert_eq!(
+        messages_of(&text),
+        ["a.xml:1:24: undefined parameter: $a (give it a value with -D a=… or with a <default> above)"]
+    );
     let text = scene("<default name='spp' value='4'/>");
     let errors = |list: &[_]| load_str(&text, "a.xml", &defines(list)).unwrap_err().to_string();
     assert_eq!(errors(&[("spb", "16")]), "error: unused parameter: $spb=16 (did you mean \"spp\"?)");
