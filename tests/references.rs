@@ -48,16 +48,16 @@ fn measure(passes: &[Vec<f64>]) -> Measured {
     Measured { mean, variance }
 }
 
-/// Means of whole tiles, one after another per channel.
-fn tile_means(image: &[f64], size: [u32; 2], channels: usize) -> Vec<f64> {
-    let [width, height] = size;
+/// Means of whole tiles of the given edge, one after another per channel.
+fn tile_means(image: &[f64], [width, height]: [u32; 2], edge: u32) -> Vec<f64> {
+    let channels = image.len() / (width * height) as usize;
     let mut means = Vec::new();
-    for ty in 0..(height / TILE).max(1) {
-        for tx in 0..(width / TILE).max(1) {
+    for ty in 0..(height / edge).max(1) {
+        for tx in 0..(width / edge).max(1) {
             for channel in 0..channels {
                 let (mut sum, mut count) = (0.0, 0.0);
-                for y in ty * TILE..(ty * TILE + TILE).min(height) {
-                    for x in tx * TILE..(tx * TILE + TILE).min(width) {
+                for y in ty * edge..(ty * edge + edge).min(height) {
+                    for x in tx * edge..(tx * edge + edge).min(width) {
                         sum += image[(y * width + x) as usize * channels + channel];
                         count += 1.0;
                     }
@@ -67,6 +67,17 @@ fn tile_means(image: &[f64], size: [u32; 2], channels: usize) -> Vec<f64> {
         }
     }
     means
+}
+
+/// Means over tiles of that edge, and their variances: from the variances of the pixels where these are independent,
+/// else (under a filter wider than a pixel, neighbours share samples) from whole passes.
+fn tiles(measured: &Measured, passes: Option<&[Vec<f64>]>, size: [u32; 2], edge: u32) -> Measured {
+    if let Some(passes) = passes {
+        return measure(&passes.iter().map(|p| tile_means(p, size, edge)).collect::<Vec<_>>());
+    }
+    let count = f64::from(edge.min(size[0]) * edge.min(size[1]));
+    let variance = tile_means(&measured.variance, size, edge).iter().map(|v| v / count).collect();
+    Measured { mean: tile_means(&measured.mean, size, edge), variance }
 }
 
 /// Two-sided p-value of Student's t with `freedom` degrees of freedom (Hill 1970, Algorithm 395: normal approximation).
@@ -109,11 +120,11 @@ struct Verdict {
     ratio: f64,
 }
 
-fn compare(entry: &Entry) -> Result<Verdict, String> {
+fn compare(entry: &Entry, spp: u32, seed: u32) -> Result<Verdict, String> {
     let scene = load_entry(entry);
     let reference = read_exr(&format!("reference/images/{}.exr", entry.name));
     let variance = read_exr(&format!("reference/images/{}.var.exr", entry.name));
-    let images: Vec<Image> = (0..PASSES).map(|i| render(&scene, SPP, 1000 + i, SampleOrder::PerSample).0).collect();
+    let images: Vec<Image> = (0..PASSES).map(|i| render(&scene, spp, seed + i, SampleOrder::PerSample).0).collect();
     let ours = &images[0];
     if [ours.width, ours.height] != [reference.width, reference.height] {
         return Err(format!("sizes differ: {}x{}", ours.width, ours.height));
@@ -130,46 +141,51 @@ fn compare(entry: &Entry) -> Result<Verdict, String> {
     let passes: Vec<Vec<f64>> = images.iter().map(pick).collect();
     let mine = measure(&passes);
     let theirs: Vec<f64> = reference.data.iter().map(|v| f64::from(*v)).collect();
-    let their_variance: Vec<f64> = variance.data.iter().map(|v| f64::from(*v)).collect();
-    let channels = order.len();
     let size = [ours.width, ours.height];
 
     // Our samples are fewer than the reference's by this factor: where one side saw no variance, the other's counts.
-    let fewer = f64::from(entry.spp * entry.passes) / f64::from(SPP * PASSES);
+    let fewer = f64::from(entry.spp * entry.passes) / f64::from(spp * PASSES);
     let scale = theirs.iter().map(|v| v.abs()).sum::<f64>() / theirs.len() as f64;
     let freedom = f64::from(PASSES - 1) + f64::from(entry.passes - 1);
 
-    let test = |a: f64, b: f64, va: f64, vb: f64| {
-        let variance = va.max(vb * fewer) + vb.max(va / fewer);
-        let rounding = ROUNDING * (b.abs() + 0.01 * scale);
-        let excess = ((a - b).abs() - rounding).max(0.0);
-        if excess == 0.0 { 1.0 } else { p_value(excess / variance.sqrt().max(1e-30), freedom) }
+    let reference = Measured { mean: theirs, variance: variance.data.iter().map(|v| f64::from(*v)).collect() };
+    let sidak = |n: usize| 1.0 - (1.0 - SIGNIFICANCE).powf(1.0 / n.max(1) as f64);
+    // p-values of all values; where one side happened to see no variance, the other's counts, scaled.
+    let test = |a: &Measured, b: &Measured, freedom: f64| -> Vec<f64> {
+        (0..b.mean.len())
+            .map(|i| {
+                let variance = a.variance[i].max(b.variance[i] * fewer) + b.variance[i].max(a.variance[i] / fewer);
+                let rounding = ROUNDING * (b.mean[i].abs() + 0.01 * scale);
+                let excess = ((a.mean[i] - b.mean[i]).abs() - rounding).max(0.0);
+                if excess == 0.0 { 1.0 } else { p_value(excess / variance.sqrt().max(1e-30), freedom) }
+            })
+            .collect()
     };
-    let sidak = |level: f64, n: usize| 1.0 - (1.0 - level).powf(1.0 / n.max(1) as f64);
+    let bound = sidak(reference.mean.len());
+    let good = test(&mine, &reference, freedom).iter().filter(|p| **p >= bound).count();
+    let values = reference.mean.len();
 
-    let values = theirs.len();
-    let bound = sidak(SIGNIFICANCE, values);
-    let good =
-        (0..values).filter(|&i| test(mine.mean[i], theirs[i], mine.variance[i], their_variance[i]) >= bound).count();
-
-    // Means over tiles: neighbours share samples under wide filters, so their variance is taken from whole passes.
-    let tiles = measure(&passes.iter().map(|p| tile_means(p, size, channels)).collect::<Vec<_>>());
-    let their_tiles = tile_means(&theirs, size, channels);
-    let worst_tile = (0..their_tiles.len())
-        .map(|i| test(tiles.mean[i], their_tiles[i], tiles.variance[i], tiles.variance[i] / fewer))
-        .fold(1.0, f64::min);
-    let tile_bound = sidak(SIGNIFICANCE, their_tiles.len());
-
-    let total = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
-    let mean = measure(&passes.iter().map(|p| vec![total(p)]).collect::<Vec<_>>());
-    let their_mean = total(&theirs);
-    let p_mean = test(mean.mean[0], their_mean, mean.variance[0], mean.variance[0] / fewer);
+    let box_filter = scene.sensors()[0].film.settings().filter.is_box();
+    let whole = (!box_filter).then_some(&passes[..]);
+    let averaged = |edge: u32| {
+        let ours = tiles(&mine, whole, size, edge);
+        let mut theirs = tiles(&reference, None, size, edge);
+        if !box_filter {
+            theirs.variance = ours.variance.iter().map(|v| v / fewer).collect();
+        }
+        let freedom = if box_filter { f64::from(edge * edge) * freedom } else { f64::from(PASSES - 1) };
+        let p = test(&ours, &theirs, freedom);
+        (p.iter().copied().fold(1.0, f64::min) / sidak(p.len()), ours, theirs)
+    };
+    let (worst_tile, ..) = averaged(TILE);
+    let (worst_mean, mean, their_mean) = averaged(size[0].max(size[1]));
+    let total = |v: &[f64]| v.iter().sum::<f64>();
 
     let verdict = Verdict {
         pixels: good as f64 / values as f64,
-        worst_tile: worst_tile / tile_bound,
-        mean: p_mean / SIGNIFICANCE,
-        ratio: mean.mean[0] / their_mean,
+        worst_tile,
+        mean: worst_mean,
+        ratio: total(&mean.mean) / total(&their_mean.mean),
     };
     let line = format!(
         "{:<40} pixels {:.4}, worst tile p/bound {:.1e}, mean p/bound {:.1e}, ratio {:.5}",
@@ -187,7 +203,9 @@ fn test_scenes_agree_with_their_references() {
     let results: Vec<Result<Verdict, String>> = entries
         .par_iter()
         .map(|entry| {
-            std::panic::catch_unwind(|| compare(entry))
+            // A hundred tests at 1 % raise one false alarm: a scene that fails gets a second look with other random
+            // numbers and four times the samples, which a real difference does not survive.
+            std::panic::catch_unwind(|| compare(entry, SPP, 1000).or_else(|_| compare(entry, 4 * SPP, 5000)))
                 .unwrap_or_else(|_| Err(format!("{:<40} panicked", entry.name)))
                 .map_err(|line| if line.starts_with(&entry.name) { line } else { format!("{:<40} {line}", entry.name) })
         })
@@ -195,7 +213,5 @@ fn test_scenes_agree_with_their_references() {
     let failed: Vec<&String> = results.iter().filter_map(|r| r.as_ref().err()).collect();
     println!("{} scenes agree, {} are left apart", results.len() - failed.len(), APART.len());
     let list: Vec<&str> = failed.iter().map(|s| s.as_str()).collect();
-    // The mean and tiles of 250 scenes are tested at 1 % each: some fail by chance, none twice. Those get another look
-    // with other seeds by `LUCERNA_ONLY=name`; here more than chance allows is a failure.
     assert!(list.is_empty(), "{} of {} scenes differ:\n{}", list.len(), results.len(), list.join("\n"));
 }
