@@ -3,7 +3,8 @@
 use lucerna_core::accel::Ray;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{EmitterFlags, LightPoint, SurfaceHit};
-use lucerna_core::math::Vec3;
+use lucerna_core::math::{Vec2, Vec3};
+use lucerna_core::sampling::Stream;
 use lucerna_core::scene::{EmitterId, Param, Properties, Scene};
 
 /// Parameters of every integrator.
@@ -56,6 +57,14 @@ pub fn mis_weight(a: f32, b: f32) -> f32 {
 #[inline]
 pub fn survival(throughput: Rgb, eta: f32) -> f32 {
     (throughput.max_component() * eta * eta).min(0.95)
+}
+
+/// The numbers for a BSDF sample, drawn as the reference draws them in `direct` and the volume integrators: its compiler
+/// evaluates the arguments from the last to the first. In `path` the order is written out, and the other.
+#[inline]
+pub fn pair_before_single(stream: &mut Stream<'_>) -> (f32, Vec2) {
+    let pair = stream.next_2d();
+    (stream.next_1d(), pair)
 }
 
 /// Where a path was last scattered into a density: what a light found by chance is weighted against.

@@ -17,7 +17,10 @@
 //! </integrator>
 //! ```
 
-use super::common::{COMMON, PATH, PathLimits, Scattered, forward_integrator, mis_weight, survival, weighted_emission};
+use super::common::{
+    COMMON, PATH, PathLimits, Scattered, forward_integrator, mis_weight, pair_before_single, survival,
+    weighted_emission,
+};
 use lucerna_core::accel::Ray;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{
@@ -109,7 +112,7 @@ impl RadianceEstimator for VolPath {
                     found.rgb += throughput * contribution * if light.delta { 1.0 } else { mis_weight(light.pdf, pdf) };
                 }
             }
-            let (u1, u2) = (stream.next_1d(), stream.next_2d());
+            let (u1, u2) = pair_before_single(stream);
             let Some(sample) = bxdf.sample(hit.wi, u1, u2, Transport::Radiance) else {
                 // The reference notices at the start of the next vertex, and draws the roulette's number first.
                 stream.next_1d();
