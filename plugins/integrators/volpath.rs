@@ -18,8 +18,8 @@
 //! ```
 
 use super::common::{
-    COMMON, PATH, PathLimits, Scattered, forward_integrator, mis_weight, pair_before_single, survival,
-    weighted_emission,
+    COMMON, PATH, PathLimits, Scattered, first_hit_without_light, forward_integrator, mis_weight, pair_before_single,
+    survival, weighted_emission,
 };
 use lucerna_core::accel::Ray;
 use lucerna_core::color::Rgb;
@@ -82,9 +82,12 @@ impl RadianceEstimator for VolPath {
         // The reference picks the colour channel that media are sampled by.
         stream.next_1d();
         loop {
+            if throughput.is_black() {
+                break;
+            }
             let q = survival(throughput, eta);
             let u = stream.next_1d();
-            if throughput.is_black() || depth >= max_depth {
+            if depth >= max_depth {
                 break;
             }
             if depth > rr_depth {
@@ -93,9 +96,14 @@ impl RadianceEstimator for VolPath {
                 }
                 throughput *= 1.0 / q;
             }
-            found.rays += 1;
-            let hit = scene.intersect_surface(&ray);
-            if !(depth == 0 && hide_emitters) {
+            let hidden = hide_emitters && depth == 0;
+            let hit = if hidden {
+                first_hit_without_light(scene, &ray, &mut found.rays)
+            } else {
+                found.rays += 1;
+                scene.intersect_surface(&ray)
+            };
+            if !hidden {
                 found.rgb += throughput * weighted_emission(scene, &ray, hit.as_ref(), last);
             }
             let Some(hit) = hit else { break };
@@ -114,8 +122,6 @@ impl RadianceEstimator for VolPath {
             }
             let (u1, u2) = pair_before_single(stream);
             let Some(sample) = bxdf.sample(hit.wi, u1, u2, Transport::Radiance) else {
-                // The reference notices at the start of the next vertex, and draws the roulette's number first.
-                stream.next_1d();
                 found.alpha = 1.0;
                 break;
             };
