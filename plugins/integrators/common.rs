@@ -52,6 +52,13 @@ pub fn mis_weight(a: f32, b: f32) -> f32 {
     if weight.is_finite() { weight } else { 0.0 }
 }
 
+/// Balance heuristic (Veach 1997, section 9.2): the weight of the strategy with density `a`.
+#[inline]
+pub fn balance_weight(a: f32, b: f32) -> f32 {
+    let weight = a / (a + b);
+    if weight.is_finite() { weight } else { 0.0 }
+}
+
 /// Survival probability of Russian roulette: the throughput's largest channel, with the compression of radiance in
 /// optically dense media taken out, at most 0.95 so that total internal reflection ends too.
 #[inline]
@@ -92,9 +99,15 @@ pub fn emission(scene: &Scene, ray: &Ray, hit: Option<&SurfaceHit>) -> Option<(E
     (!radiance.is_black()).then_some((id, radiance))
 }
 
-/// As [`emission`], weighted against emitter sampling if the path was scattered into a density before.
+/// As [`emission`], weighted by `heuristic` against emitter sampling if the path was scattered into a density before.
 #[inline]
-pub fn weighted_emission(scene: &Scene, ray: &Ray, hit: Option<&SurfaceHit>, last: Option<Scattered>) -> Rgb {
+pub fn weighted_emission(
+    scene: &Scene,
+    ray: &Ray,
+    hit: Option<&SurfaceHit>,
+    last: Option<Scattered>,
+    heuristic: impl Fn(f32, f32) -> f32,
+) -> Rgb {
     let Some((id, radiance)) = emission(scene, ray, hit) else { return Rgb::BLACK };
     match last {
         None => radiance,
@@ -103,7 +116,7 @@ pub fn weighted_emission(scene: &Scene, ray: &Ray, hit: Option<&SurfaceHit>, las
                 Some(hit) => LightPoint::of_hit(last.p, hit, ray.d),
                 None => LightPoint::of_environment(ray.d),
             };
-            radiance * mis_weight(last.pdf, scene.pdf_emitter(id, last.p, &point))
+            radiance * heuristic(last.pdf, scene.pdf_emitter(id, last.p, &point))
         }
     }
 }
