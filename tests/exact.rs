@@ -16,12 +16,27 @@ use support::{Entry, load_entry, manifest, read_exr, render_with};
 const THREADS: u32 = 3;
 
 /// Scenes that cannot follow the reference's samples, and why.
-const APART: &[(&str, &str)] = &[];
+const APART: &[(&str, &str)] = &[
+    (
+        "analytic/furnace_sphere",
+        "inside a sphere the reference misjudges the density of hits: 1.508 at depth 2, not 1.5",
+    ),
+    ("emitters/area_mesh", "the reference's density has the smooth normal's cosine: 0.8 % of the light lost beside it"),
+    ("emitters/sunsky", "sun and sky are sampled in another way"),
+    ("integrators/aov_uv_differentials", "no ray differentials are followed"),
+    ("shapes/ply_colors", "the texture mesh_attribute is not there"),
+    ("textures/bitmap_formats", "the JPEG decoders enlarge the chroma differently; the other formats agree"),
+];
+
+/// Channel that is not compared: the reference's numbers of shapes change from run to run, ours are in file order.
+const SHAPE_NUMBER: &str = "shape.I";
 
 /// Share of pixels that agree, and the worst pixel.
 fn agreement(ours: &Image, reference: &Image, tolerance: f32) -> (f64, [u32; 2]) {
-    let channels: Vec<(usize, usize)> =
-        reference.channels.iter().enumerate().filter_map(|(i, name)| ours.channel(name).map(|j| (j, i))).collect();
+    let channels: Vec<(usize, usize)> = (reference.channels.iter().enumerate())
+        .filter(|(_, name)| *name != SHAPE_NUMBER)
+        .filter_map(|(i, name)| ours.channel(name).map(|j| (j, i)))
+        .collect();
     assert!(!channels.is_empty(), "no common channels: {:?} {:?}", ours.channels, reference.channels);
     assert_eq!([ours.width, ours.height], [reference.width, reference.height]);
     let scale = reference.data.iter().map(|v| v.abs()).sum::<f32>() / reference.data.len() as f32;

@@ -3,7 +3,8 @@
 use lucerna_core::accel::Ray;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{EmitterFlags, LightPoint, SurfaceHit};
-use lucerna_core::math::Vec3;
+use lucerna_core::math::{Vec2, Vec3};
+use lucerna_core::sampling::Stream;
 use lucerna_core::scene::{EmitterId, Param, Properties, Scene};
 
 /// Parameters of every integrator.
@@ -62,11 +63,26 @@ pub fn mis_weight(a: f32, b: f32) -> f32 {
     if weight.is_finite() { weight } else { 0.0 }
 }
 
+/// Balance heuristic (Veach 1997, section 9.2): the weight of the strategy with density `a`.
+#[inline]
+pub fn balance_weight(a: f32, b: f32) -> f32 {
+    let weight = a / (a + b);
+    if weight.is_finite() { weight } else { 0.0 }
+}
+
 /// Survival probability of Russian roulette: the throughput's largest channel, with the compression of radiance in
 /// optically dense media taken out, at most 0.95 so that total internal reflection ends too.
 #[inline]
 pub fn survival(throughput: Rgb, eta: f32) -> f32 {
     (throughput.max_component() * eta * eta).min(0.95)
+}
+
+/// The numbers for a BSDF sample, drawn as the reference draws them in `direct` and the volume integrators: its compiler
+/// evaluates the arguments from the last to the first. In `path` the order is written out, and the other.
+#[inline]
+pub fn pair_before_single(stream: &mut Stream<'_>) -> (f32, Vec2) {
+    let pair = stream.next_2d();
+    (stream.next_1d(), pair)
 }
 
 /// Where a path was last scattered into a density: what a light found by chance is weighted against.
@@ -94,9 +110,15 @@ pub fn emission(scene: &Scene, ray: &Ray, hit: Option<&SurfaceHit>) -> Option<(E
     (!radiance.is_black()).then_some((id, radiance))
 }
 
-/// As [`emission`], weighted against emitter sampling if the path was scattered into a density before.
+/// As [`emission`], weighted by `heuristic` against emitter sampling if the path was scattered into a density before.
 #[inline]
-pub fn weighted_emission(scene: &Scene, ray: &Ray, hit: Option<&SurfaceHit>, last: Option<Scattered>) -> Rgb {
+pub fn weighted_emission(
+    scene: &Scene,
+    ray: &Ray,
+    hit: Option<&SurfaceHit>,
+    last: Option<Scattered>,
+    heuristic: impl Fn(f32, f32) -> f32,
+) -> Rgb {
     let Some((id, radiance)) = emission(scene, ray, hit) else { return Rgb::BLACK };
     match last {
         None => radiance,
@@ -105,7 +127,7 @@ pub fn weighted_emission(scene: &Scene, ray: &Ray, hit: Option<&SurfaceHit>, las
                 Some(hit) => LightPoint::of_hit(last.p, hit, ray.d),
                 None => LightPoint::of_environment(ray.d),
             };
-            radiance * mis_weight(last.pdf, scene.pdf_emitter(id, last.p, &point))
+            radiance * heuristic(last.pdf, scene.pdf_emitter(id, last.p, &point))
         }
     }
 }

@@ -17,7 +17,11 @@
 //! </integrator>
 //! ```
 
+<<<<<<< HEAD
 use super::common::{COMMON, HIDE, emission, first_hit_without_light, forward_integrator, mis_weight, timeout};
+=======
+use super::common::{COMMON, emission, first_hit_without_light, forward_integrator, mis_weight, pair_before_single};
+>>>>>>> exact
 use lucerna_core::accel::Ray;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{Arena, Integrator, LightPoint, Lobes, Radiance, RadianceEstimator, Transport};
@@ -111,7 +115,7 @@ impl RadianceEstimator for Direct {
         }
 
         for _ in 0..self.bsdf_samples {
-            let (u1, u2) = (stream.next_1d(), stream.next_2d());
+            let (u1, u2) = pair_before_single(stream);
             let Some(sample) = bxdf.sample(hit.wi, u1, u2, Transport::Radiance) else { continue };
             let d = hit.to_world(sample.wo);
             let next = Ray::new(hit.origin_towards(d), d);

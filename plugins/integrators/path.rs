@@ -81,7 +81,7 @@ impl RadianceEstimator for Path {
                 scene.intersect_surface(&ray)
             };
             if !hidden {
-                found.rgb += throughput * weighted_emission(scene, &ray, hit.as_ref(), last);
+                found.rgb += throughput * weighted_emission(scene, &ray, hit.as_ref(), last, mis_weight);
             }
             let Some(hit) = hit else { break };
             if depth + 1 >= max_depth {

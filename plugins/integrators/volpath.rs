@@ -18,7 +18,12 @@
 //! ```
 
 use super::common::{
+<<<<<<< HEAD
     COMMON, PATH, PathLimits, Scattered, forward_integrator, mis_weight, survival, timeout, weighted_emission,
+=======
+    COMMON, PATH, PathLimits, Scattered, balance_weight, first_hit_without_light, forward_integrator, mis_weight,
+    pair_before_single, survival, weighted_emission,
+>>>>>>> exact
 };
 use lucerna_core::accel::Ray;
 use lucerna_core::color::Rgb;
@@ -39,21 +44,49 @@ pub const PLUGIN: Plugin = Plugin {
 };
 
 fn build(p: &Properties<'_>) -> Built<dyn Integrator> {
-    Ok(Arc::new(VolPath::new(p)))
+    Ok(Arc::new(VolPath::new(p, Variant::Plain)))
 }
 
 /// Surfaces a straight line may pass before it counts as blocked: bounds the work where surfaces coincide.
 const MOST_PASSED: u32 = 4096;
 
+/// Where the two plugins differ on surfaces.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Variant {
+    /// `volpath`: the power heuristic.
+    Plain,
+    /// `volpathmis`: the balance heuristic, and a number for roulette even where nothing is left of the throughput.
+    SpectralMis,
+}
+
+impl Variant {
+    #[inline]
+    fn weight(self, a: f32, b: f32) -> f32 {
+        match self {
+            Variant::Plain => mis_weight(a, b),
+            Variant::SpectralMis => balance_weight(a, b),
+        }
+    }
+}
+
 /// The estimator, shared with `volpathmis`.
 pub(super) struct VolPath {
     limits: PathLimits,
+<<<<<<< HEAD
     timeout: Option<f64>,
 }
 
 impl VolPath {
     pub(super) fn new(p: &Properties<'_>) -> Self {
         VolPath { limits: PathLimits::new(p), timeout: timeout(p) }
+=======
+    variant: Variant,
+}
+
+impl VolPath {
+    pub(super) fn new(p: &Properties<'_>, variant: Variant) -> Self {
+        VolPath { limits: PathLimits::new(p), variant }
+>>>>>>> exact
     }
 }
 
@@ -82,6 +115,9 @@ impl RadianceEstimator for VolPath {
         // The reference picks the colour channel that media are sampled by.
         stream.next_1d();
         loop {
+            if throughput.is_black() && self.variant == Variant::Plain {
+                break;
+            }
             let q = survival(throughput, eta);
             let u = stream.next_1d();
             if throughput.is_black() || depth >= max_depth {
@@ -93,10 +129,16 @@ impl RadianceEstimator for VolPath {
                 }
                 throughput *= 1.0 / q;
             }
-            found.rays += 1;
-            let hit = scene.intersect_surface(&ray);
-            if !(depth == 0 && hide_emitters) {
-                found.rgb += throughput * weighted_emission(scene, &ray, hit.as_ref(), last);
+            let hidden = hide_emitters && depth == 0;
+            let hit = if hidden {
+                first_hit_without_light(scene, &ray, &mut found.rays)
+            } else {
+                found.rays += 1;
+                scene.intersect_surface(&ray)
+            };
+            if !hidden {
+                found.rgb +=
+                    throughput * weighted_emission(scene, &ray, hit.as_ref(), last, |a, b| self.variant.weight(a, b));
             }
             let Some(hit) = hit else { break };
             let bsdf = scene.bsdf(&hit);
@@ -109,13 +151,12 @@ impl RadianceEstimator for VolPath {
                 let mut contribution = value * light.weight;
                 if !contribution.is_black() {
                     contribution *= transmittance(scene, &hit, &light, &mut found.rays);
-                    found.rgb += throughput * contribution * if light.delta { 1.0 } else { mis_weight(light.pdf, pdf) };
+                    found.rgb +=
+                        throughput * contribution * if light.delta { 1.0 } else { self.variant.weight(light.pdf, pdf) };
                 }
             }
-            let (u1, u2) = (stream.next_1d(), stream.next_2d());
+            let (u1, u2) = pair_before_single(stream);
             let Some(sample) = bxdf.sample(hit.wi, u1, u2, Transport::Radiance) else {
-                // The reference notices at the start of the next vertex, and draws the roulette's number first.
-                stream.next_1d();
                 found.alpha = 1.0;
                 break;
             };

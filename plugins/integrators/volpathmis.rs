@@ -1,6 +1,7 @@
 //! `volpathmis`: as `volpath`, with spectral multiple importance sampling inside media.
 //!
-//! Where a scene holds no medium both are the same estimator.
+//! Where a scene holds no medium both are the same estimator, but light samples and BSDF samples are weighted by the
+//! balance heuristic (Miller, Georgiev, Jarosz 2019, section 4).
 //!
 //! | parameter | type | default | meaning |
 //! |---|---|---|---|
@@ -14,7 +15,7 @@
 //! ```
 
 use super::common::{COMMON, PATH};
-use super::volpath::VolPath;
+use super::volpath::{Variant, VolPath};
 use lucerna_core::interfaces::Integrator;
 use lucerna_core::scene::{Built, Constructor, Param, Plugin, Properties};
 use std::sync::Arc;
@@ -29,5 +30,5 @@ pub const PLUGIN: Plugin = Plugin {
 };
 
 fn build(p: &Properties<'_>) -> Built<dyn Integrator> {
-    Ok(Arc::new(VolPath::new(p)))
+    Ok(Arc::new(VolPath::new(p, Variant::SpectralMis)))
 }

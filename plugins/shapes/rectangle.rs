@@ -40,7 +40,8 @@ fn build(p: &Properties<'_>) -> Built<dyn Shape> {
     Ok(Arc::new(Rectangle { corners, area: 4.0 * plane.area, plane }))
 }
 
-const TRIANGLES: [[u32; 3]; 2] = [[0, 1, 2], [0, 2, 3]];
+/// Cut and numbered as in the reference.
+const TRIANGLES: [[u32; 3]; 2] = [[0, 1, 3], [2, 3, 1]];
 
 struct Rectangle {
     plane: Plane,
@@ -76,8 +77,9 @@ impl Shape for Rectangle {
     }
 
     fn surface(&self, _ray: &Ray, hit: &Hit) -> SurfaceHit {
-        let uv = if hit.prim == 0 { Vec2::new(hit.u + hit.v, hit.v) } else { Vec2::new(hit.u, hit.u + hit.v) };
-        SurfaceHit { prim: hit.prim, barycentric: Vec2::new(hit.u, hit.v), ..self.hit_at(hit.t, uv.min(Vec2::ONE)) }
+        let barycentric = Vec2::new(hit.u, hit.v);
+        let uv = if hit.prim == 0 { barycentric } else { Vec2::ONE - barycentric };
+        SurfaceHit { prim: hit.prim, barycentric, ..self.hit_at(hit.t, uv.max(Vec2::ZERO)) }
     }
 
     fn sample_area(&self, u2: Vec2) -> Option<AreaSample> {
