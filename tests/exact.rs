@@ -24,7 +24,6 @@ const APART: &[(&str, &str)] = &[
     ("emitters/area_mesh", "the reference's density has the smooth normal's cosine: 0.8 % of the light lost beside it"),
     ("emitters/sunsky", "sun and sky are sampled in another way"),
     ("integrators/aov_uv_differentials", "no ray differentials are followed"),
-    ("shapes/ply_colors", "the texture mesh_attribute is not there"),
     ("textures/bitmap_formats", "the JPEG decoders enlarge the chroma differently; the other formats agree"),
 ];
 

@@ -31,7 +31,13 @@ const TILE: u32 = 8;
 const ROUNDING: f64 = 5e-4;
 
 /// Scenes whose reference is not the truth, and why.
-const APART: &[(&str, &str)] = &[];
+const APART: &[(&str, &str)] = &[
+    ("analytic/furnace_sphere", "the reference is 0.2 to 0.5 % too bright inside an emitting sphere; see analytic.rs"),
+    ("integrators/aov_uv_differentials", "differentials are not followed"),
+];
+
+/// Scenes that are only the reference's when rays start as far off surfaces as its do: 9 cm, 1000 units from the origin.
+const FAR: &str = "shapes/far_from_origin";
 
 /// Mean and variance of the mean, per value.
 struct Measured {
@@ -121,7 +127,10 @@ struct Verdict {
 }
 
 fn compare(entry: &Entry, spp: u32, seed: u32) -> Result<Verdict, String> {
-    let scene = load_entry(entry);
+    let mut scene = load_entry(entry);
+    if entry.name == FAR {
+        scene.use_reference_offsets();
+    }
     let reference = read_exr(&format!("reference/images/{}.exr", entry.name));
     let variance = read_exr(&format!("reference/images/{}.var.exr", entry.name));
     let images: Vec<Image> = (0..PASSES).map(|i| render(&scene, spp, seed + i, SampleOrder::PerSample).0).collect();

@@ -17,11 +17,9 @@
 //! </integrator>
 //! ```
 
-<<<<<<< HEAD
-use super::common::{COMMON, HIDE, emission, first_hit_without_light, forward_integrator, mis_weight, timeout};
-=======
-use super::common::{COMMON, emission, first_hit_without_light, forward_integrator, mis_weight, pair_before_single};
->>>>>>> exact
+use super::common::{
+    COMMON, HIDE, emission, first_hit_without_light, forward_integrator, mis_weight, pair_before_single, timeout,
+};
 use lucerna_core::accel::Ray;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{Arena, Integrator, LightPoint, Lobes, Radiance, RadianceEstimator, Transport};

@@ -18,12 +18,8 @@
 //! ```
 
 use super::common::{
-<<<<<<< HEAD
-    COMMON, PATH, PathLimits, Scattered, forward_integrator, mis_weight, survival, timeout, weighted_emission,
-=======
     COMMON, PATH, PathLimits, Scattered, balance_weight, first_hit_without_light, forward_integrator, mis_weight,
-    pair_before_single, survival, weighted_emission,
->>>>>>> exact
+    pair_before_single, survival, timeout, weighted_emission,
 };
 use lucerna_core::accel::Ray;
 use lucerna_core::color::Rgb;
@@ -72,21 +68,13 @@ impl Variant {
 /// The estimator, shared with `volpathmis`.
 pub(super) struct VolPath {
     limits: PathLimits,
-<<<<<<< HEAD
     timeout: Option<f64>,
-}
-
-impl VolPath {
-    pub(super) fn new(p: &Properties<'_>) -> Self {
-        VolPath { limits: PathLimits::new(p), timeout: timeout(p) }
-=======
     variant: Variant,
 }
 
 impl VolPath {
     pub(super) fn new(p: &Properties<'_>, variant: Variant) -> Self {
-        VolPath { limits: PathLimits::new(p), variant }
->>>>>>> exact
+        VolPath { limits: PathLimits::new(p), timeout: timeout(p), variant }
     }
 }
 

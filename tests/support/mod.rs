@@ -33,7 +33,7 @@ pub struct Entry {
 /// The tables of a section of the manifest: `image` or `exact`.
 pub fn manifest(section: &str) -> Vec<Entry> {
     let text = std::fs::read_to_string(repository("reference/manifest.toml")).expect("manifest");
-    let manifest: toml::Table = text.parse().expect("manifest is TOML");
+    let manifest: toml::Table = text.parse().unwrap_or_else(|e| panic!("manifest: {}", toml::de::Error::message(&e)));
     let number = |t: &toml::Table, key: &str| t[key].as_integer().unwrap_or_default() as u32;
     manifest[section]
         .as_table()
