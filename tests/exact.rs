@@ -7,10 +7,8 @@
 mod support;
 
 use lucerna::core::image::Image;
-use lucerna::core::interfaces::Rfilter;
 use lucerna::core::render::SampleOrder;
-use std::sync::Arc;
-use support::{Entry, load_entry, manifest, read_exr, render_with};
+use support::{Entry, load_entry, manifest, read_exr, render_with, tabulate_filter};
 
 /// Threads the reference counted: two workers and the main one.
 const THREADS: u32 = 3;
@@ -56,44 +54,13 @@ fn agreement(ours: &Image, reference: &Image, tolerance: f32) -> (f64, [u32; 2])
     (f64::from(good) / f64::from(ours.width * ours.height), worst.1)
 }
 
-/// A filter as the reference's scalar variants look it up: 31 values over the radius, the nearest lower one counts.
-struct Tabulated {
-    radius: f32,
-    values: [f32; Tabulated::STEPS + 1],
-}
-
-impl Tabulated {
-    const STEPS: usize = 31;
-
-    fn new(filter: &dyn Rfilter) -> Self {
-        let radius = filter.radius();
-        let mut values = [0.0; Self::STEPS + 1];
-        for (i, value) in values.iter_mut().take(Self::STEPS).enumerate() {
-            *value = filter.eval(radius * i as f32 / Self::STEPS as f32);
-        }
-        Tabulated { radius, values }
-    }
-}
-
-impl Rfilter for Tabulated {
-    fn radius(&self) -> f32 {
-        self.radius
-    }
-
-    fn eval(&self, x: f32) -> f32 {
-        self.values[((x.abs() * Self::STEPS as f32 / self.radius) as usize).min(Self::STEPS)]
-    }
-}
-
 /// Renders an exact image and tells the share of agreeing pixels.
 fn check(entry: &Entry) -> Result<f64, String> {
     let mut scene = load_entry(entry);
     scene.use_reference_offsets();
     let (ours, _) = render_with(&scene, entry.spp, entry.seed, |cx| {
         cx.order = SampleOrder::Reference { threads: THREADS };
-        if !cx.film.filter.is_box() {
-            cx.film.filter = Arc::new(Tabulated::new(&*cx.film.filter));
-        }
+        tabulate_filter(cx);
     });
     let reference = read_exr(&format!("reference/exact/{}.exr", entry.name));
     let is_depth = entry.scene.contains("depth");

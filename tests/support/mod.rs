@@ -2,9 +2,11 @@
 #![allow(dead_code)] // Each test binary uses its part.
 
 use lucerna::core::image::{Image, ReadLimits, exr};
+use lucerna::core::interfaces::Rfilter;
 use lucerna::core::render::{Budget, Control, RenderContext, Report, SampleOrder};
 use lucerna::core::scene::{Description, ObjectKind, Parameter, Scene, Value, instantiate, resolve, upgrade, xml};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A file of the repository.
 pub fn repository(path: impl AsRef<Path>) -> PathBuf {
@@ -28,6 +30,8 @@ pub struct Entry {
     pub spp: u32,
     /// Independent passes.
     pub passes: u32,
+    /// Rendered by `scalar_rgb`, which looks filters up in a table.
+    pub scalar: bool,
 }
 
 /// The tables of a section of the manifest: `image` or `exact`.
@@ -52,6 +56,7 @@ pub fn manifest(section: &str) -> Vec<Entry> {
                 seed: number(t, "seed"),
                 spp: number(t, "spp"),
                 passes: number(t, "passes"),
+                scalar: t["variant"].as_str() == Some("scalar_rgb"),
             }
         })
         .collect()
@@ -108,4 +113,40 @@ pub fn render_with(scene: &Scene, spp: u32, seed: u32, change: impl FnOnce(&mut 
 /// Reads all channels of an EXR file of the repository.
 pub fn read_exr(path: &str) -> Image {
     exr::read(&repository(path), &ReadLimits::default()).unwrap_or_else(|e| panic!("{path}: {e}")).image
+}
+
+/// A filter as the reference's scalar variants look it up: 31 values over the radius, the nearest lower one counts.
+struct Tabulated {
+    radius: f32,
+    values: [f32; Tabulated::STEPS + 1],
+}
+
+impl Tabulated {
+    const STEPS: usize = 31;
+
+    fn new(filter: &dyn Rfilter) -> Self {
+        let radius = filter.radius();
+        let mut values = [0.0; Self::STEPS + 1];
+        for (i, value) in values.iter_mut().take(Self::STEPS).enumerate() {
+            *value = filter.eval(radius * i as f32 / Self::STEPS as f32);
+        }
+        Tabulated { radius, values }
+    }
+}
+
+impl Rfilter for Tabulated {
+    fn radius(&self) -> f32 {
+        self.radius
+    }
+
+    fn eval(&self, x: f32) -> f32 {
+        self.values[((x.abs() * Self::STEPS as f32 / self.radius) as usize).min(Self::STEPS)]
+    }
+}
+
+/// Looks a filter that is wider than a pixel up as the reference's scalar variants do.
+pub fn tabulate_filter(cx: &mut RenderContext<'_>) {
+    if !cx.film.filter.is_box() {
+        cx.film.filter = Arc::new(Tabulated::new(&*cx.film.filter));
+    }
 }
