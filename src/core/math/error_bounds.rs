@@ -21,9 +21,7 @@ pub const fn gamma(n: u32) -> f32 {
 /// points to, out of the box of half size `p_error`, then rounded away from the surface.
 #[inline]
 pub fn offset_origin(p: Vec3, p_error: Vec3, n: Vec3, d: Vec3) -> Vec3 {
-    let distance = n.abs().dot(p_error);
-    let away = if d.dot(n) < 0.0 { -n } else { n };
-    let offset = away * distance;
+    let offset = n * n.abs().dot(p_error).copysign(d.dot(n));
     let start = p + offset;
     Vec3::new(round_away(start.x, offset.x), round_away(start.y, offset.y), round_away(start.z, offset.z))
 }
