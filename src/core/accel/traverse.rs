@@ -141,7 +141,7 @@ impl Beam {
             height: ray.d.abs().max_element(),
             ahead: 0.0,
         };
-        beam.ahead = 1_f32.copysign(ray.d.to_array()[beam.shear.axes[2]]);
+        beam.ahead = 1_f32.copysign(ray.d[beam.shear.axes[2]]);
         for axis in 0..3 {
             let d = if ray.d[axis].abs() < tiny { tiny.copysign(ray.d[axis]) } else { ray.d[axis] };
             let inv = 1.0 / d;
@@ -491,7 +491,8 @@ fn walk<K: Kernel, const ANY: bool>(tree: &Tree, ray: &Ray) -> Option<Found> {
                 return Some(Found { t: 0.0, u: 0.0, v: 0.0, id, part: None });
             }
             while mask != 0 {
-                let lane = take_nearest(&mut mask, &near);
+                let lane = mask.trailing_zeros() as usize & (WIDTH - 1);
+                mask &= mask - 1;
                 if near[lane] > best.t * beam.height {
                     continue;
                 }
@@ -512,17 +513,6 @@ fn walk<K: Kernel, const ANY: bool>(tree: &Tree, ray: &Ray) -> Option<Found> {
             }
         }
     }
-}
-
-/// The nearer of the first two lanes in `mask`, which must not be 0.
-#[inline(always)]
-fn take_nearest(mask: &mut u32, near: &[f32; WIDTH]) -> usize {
-    let first = mask.trailing_zeros() as usize & (WIDTH - 1);
-    let rest = *mask & (*mask - 1);
-    let second = if rest == 0 { first } else { rest.trailing_zeros() as usize & (WIDTH - 1) };
-    let lane = if near[second] < near[first] { second } else { first };
-    *mask &= !(1 << lane);
-    lane
 }
 
 /// The next child of a node in `mask`, which must not be 0, as an entry of the stack. Asks for its memory.

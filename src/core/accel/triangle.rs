@@ -43,12 +43,15 @@ impl Shear {
     #[inline(always)]
     #[must_use]
     pub fn new(o: Vec3, d: Vec3) -> Self {
-        let (o, d) = (o.to_array(), d.to_array());
-        let [x, y, z] = d.map(f32::abs);
-        // Which axis it is cannot be predicted: choices without jumps.
-        let longest = if x.max(y) > z { usize::from(x <= y) } else { 2 };
-        let axes = [[1, 2, 0], [2, 0, 1], [0, 1, 2]][longest];
-        let inv_dz = 1.0 / f64::from(d[longest]);
+        let z = if d.x.abs() > d.y.abs() {
+            if d.x.abs() > d.z.abs() { 0 } else { 2 }
+        } else if d.y.abs() > d.z.abs() {
+            1
+        } else {
+            2
+        };
+        let axes = [[1, 2, 0], [2, 0, 1], [0, 1, 2]][z];
+        let inv_dz = 1.0 / f64::from(d[z]);
         let s64 = [f64::from(d[axes[0]]) * inv_dz, f64::from(d[axes[1]]) * inv_dz];
         Self { o: axes.map(|a| o[a]), axes, s: s64.map(|s| s as f32), s64, inv_dz }
     }
