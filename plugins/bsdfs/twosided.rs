@@ -73,12 +73,14 @@ impl Bsdf for TwoSided {
     }
 
     fn resolve<'a>(&'a self, hit: &SurfaceHit, arena: &'a Arena) -> &'a dyn Bxdf {
-        let flipped = SurfaceHit { wi: flip(hit.wi), ..*hit };
-        let (front, back) = if hit.wi.z < 0.0 { (&flipped, hit) } else { (hit, &flipped) };
+        let flipped = || SurfaceHit { wi: flip(hit.wi), ..*hit };
+        let behind = hit.wi.z < 0.0;
         let (front, back) = if Arc::ptr_eq(&self.front, &self.back) {
-            let seen = self.front.resolve(if hit.wi.z < 0.0 { &flipped } else { hit }, arena);
+            let seen = if behind { self.front.resolve(&flipped(), arena) } else { self.front.resolve(hit, arena) };
             (seen, seen)
         } else {
+            let flipped = flipped();
+            let (front, back) = if behind { (&flipped, hit) } else { (hit, &flipped) };
             (self.front.resolve(front, arena), self.back.resolve(back, arena))
         };
         arena.alloc(Sides { front, back })

@@ -18,7 +18,7 @@ use super::plane::Plane;
 use super::{COMMON, ORIENTED, enclose};
 use lucerna_core::accel::{Geometry, Hit, PrimHit, Primitive, Ray};
 use lucerna_core::interfaces::{AreaSample, Shape, SurfaceHit};
-use lucerna_core::math::{Aabb, Vec2};
+use lucerna_core::math::{Aabb, Frame, Vec2};
 use lucerna_core::sampling::warp;
 use lucerna_core::scene::{Built, Constructor, Plugin, Properties};
 use std::f32::consts::{PI, TAU};
@@ -41,7 +41,7 @@ impl Primitive for Plane {
     fn bounds(&self) -> Aabb {
         // An ellipse with half axes x and y reaches √(x² + y²) along each axis of the world.
         let reach = (self.x * self.x + self.y * self.y).map(f32::sqrt);
-        enclose([self.center - reach, self.center + reach], self.point(Vec2::ONE).1)
+        enclose([self.center - reach, self.center + reach], self.error)
     }
 
     fn intersect(&self, ray: &Ray) -> Option<PrimHit> {
@@ -76,8 +76,9 @@ impl Disk {
         let (cos, sin) = if uv.x > 0.0 { (local.x / uv.x, local.y / uv.x) } else { (1.0, 0.0) };
         let dp_du = plane.x * cos + plane.y * sin;
         let dp_dv = (plane.y * local.x - plane.x * local.y) * TAU;
-        let (p, p_error) = plane.point(local);
-        SurfaceHit { t, p, p_error, n: plane.n, frame: plane.frame(dp_du), uv, dp_du, dp_dv, ..SurfaceHit::default() }
+        let p = plane.point(local);
+        let frame = Frame::from_tangent(plane.n, dp_du);
+        SurfaceHit { t, p, p_error: plane.error, n: plane.n, frame, uv, dp_du, dp_dv, ..SurfaceHit::default() }
     }
 }
 
@@ -100,8 +101,8 @@ impl Shape for Disk {
 
     fn sample_area(&self, u2: Vec2) -> Option<AreaSample> {
         let local = warp::square_to_disk_concentric(u2);
-        let (p, p_error) = self.0.point(local);
-        Some(AreaSample { p, p_error, n: self.0.n, uv: Self::uv(local), pdf: 1.0 / self.area() })
+        let p = self.0.point(local);
+        Some(AreaSample { p, p_error: self.0.error, n: self.0.n, uv: Self::uv(local), pdf: 1.0 / self.area() })
     }
 
     fn at_uv(&self, uv: Vec2) -> Option<SurfaceHit> {

@@ -16,6 +16,10 @@ pub struct Plane {
     pub n: Vec3,
     /// World area of a unit of local area.
     pub area: f32,
+    /// Frame about the normal along the local x axis.
+    pub frame: Frame,
+    /// Bound on the error of [`point`](Self::point) on each axis.
+    pub error: Vec3,
 }
 
 impl Plane {
@@ -30,27 +34,17 @@ impl Plane {
         let cross = x.cross(y);
         // The normal stays on the side of the z axis, also of a mirrored or sheared one.
         let side = if (cross.dot(z) < 0.0) != p.bool("flip_normals") { -1.0 } else { 1.0 };
-        Ok(Plane {
-            center: center.as_vec3(),
-            x: x.as_vec3(),
-            y: y.as_vec3(),
-            n: (cross.normalize_or_zero() * side).as_vec3(),
-            area: cross.length() as f32,
-        })
+        let n = (cross.normalize_or_zero() * side).as_vec3();
+        let area = cross.length() as f32;
+        let [center, x, y] = [center, x, y].map(|v| v.as_vec3());
+        // Four roundings on the way, and one of each stored vector, whose size does not shrink with the coordinates.
+        let error = point_error(center.abs() + x.abs() + y.abs(), 5);
+        Ok(Plane { center, x, y, n, area, frame: Frame::from_tangent(n, x), error })
     }
 
-    /// The point at local coordinates within [−1, 1]², and the bound on its error on each axis.
+    /// The point at local coordinates within [−1, 1]².
     #[inline]
-    pub fn point(&self, local: Vec2) -> (Vec3, Vec3) {
-        let (x, y) = (self.x * local.x, self.y * local.y);
-        // Four roundings on the way, and one of each stored vector, whose size does not shrink with `local`.
-        let size = self.center.abs() + self.x.abs() + self.y.abs();
-        (self.center + x + y, point_error(size, 5))
-    }
-
-    /// The frame about the normal along a tangent.
-    #[inline]
-    pub fn frame(&self, tangent: Vec3) -> Frame {
-        Frame::from_tangent(self.n, tangent)
+    pub fn point(&self, local: Vec2) -> Vec3 {
+        self.center + self.x * local.x + self.y * local.y
     }
 }

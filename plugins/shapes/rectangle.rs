@@ -36,7 +36,7 @@ pub const PLUGIN: Plugin = Plugin {
 
 fn build(p: &Properties<'_>) -> Built<dyn Shape> {
     let plane = Plane::new(p)?;
-    let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| plane.point(Vec2::new(x, y)).0);
+    let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| plane.point(Vec2::new(x, y)));
     Ok(Arc::new(Rectangle { corners, area: 4.0 * plane.area, plane }))
 }
 
@@ -51,11 +51,11 @@ struct Rectangle {
 }
 
 impl Rectangle {
+    #[inline]
     fn hit_at(&self, t: f32, uv: Vec2) -> SurfaceHit {
-        let (p, p_error) = self.plane.point(2.0 * uv - Vec2::ONE);
-        let (dp_du, dp_dv) = (2.0 * self.plane.x, 2.0 * self.plane.y);
-        let frame = self.plane.frame(dp_du);
-        SurfaceHit { t, p, p_error, n: self.plane.n, frame, uv, dp_du, dp_dv, ..SurfaceHit::default() }
+        let Plane { x, y, n, frame, error, .. } = self.plane;
+        let p = self.plane.point(2.0 * uv - Vec2::ONE);
+        SurfaceHit { t, p, p_error: error, n, frame, uv, dp_du: 2.0 * x, dp_dv: 2.0 * y, ..SurfaceHit::default() }
     }
 }
 
@@ -79,12 +79,15 @@ impl Shape for Rectangle {
     fn surface(&self, _ray: &Ray, hit: &Hit) -> SurfaceHit {
         let barycentric = Vec2::new(hit.u, hit.v);
         let uv = if hit.prim == 0 { barycentric } else { Vec2::ONE - barycentric };
-        SurfaceHit { prim: hit.prim, barycentric, ..self.hit_at(hit.t, uv.max(Vec2::ZERO)) }
+        let mut surface = self.hit_at(hit.t, uv.max(Vec2::ZERO));
+        surface.prim = hit.prim;
+        surface.barycentric = barycentric;
+        surface
     }
 
     fn sample_area(&self, u2: Vec2) -> Option<AreaSample> {
-        let (p, p_error) = self.plane.point(2.0 * u2 - Vec2::ONE);
-        Some(AreaSample { p, p_error, n: self.plane.n, uv: u2, pdf: 1.0 / self.area })
+        let p = self.plane.point(2.0 * u2 - Vec2::ONE);
+        Some(AreaSample { p, p_error: self.plane.error, n: self.plane.n, uv: u2, pdf: 1.0 / self.area })
     }
 
     fn at_uv(&self, uv: Vec2) -> Option<SurfaceHit> {

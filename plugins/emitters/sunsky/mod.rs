@@ -228,12 +228,14 @@ impl Emitter for SunSky {
         self.sampling_weight
     }
 
-    fn sample_direct(&self, from: Vec3, u2: Vec2) -> Option<LightSample> {
-        let d = self.to_world.vector(self.daylight.as_ref()?.sample(u2)?).normalize();
+    fn sample_direct(&self, _from: Vec3, u2: Vec2) -> Option<LightSample> {
+        let daylight = self.daylight.as_ref()?;
+        let d = self.to_world.vector(daylight.sample(u2)?).normalize();
         let point = LightPoint::of_environment(d);
         // Asked about the world direction, so that a sample at the sun's rim is told the same as a ray that hits it.
-        let pdf = self.pdf_direct(from, &point);
-        let weight = self.background(d) / pdf;
+        let local = self.local(d);
+        let pdf = daylight.pdf(local);
+        let weight = daylight.radiance(local) / pdf;
         (pdf > 0.0).then_some(LightSample { point, p_error: Vec3::ZERO, pdf, weight, delta: false })
     }
 

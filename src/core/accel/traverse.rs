@@ -13,6 +13,16 @@
 //! adds u S. Each plane is therefore moved outwards by 12 u S, in the constant o · (1/d), at no cost. A direction component
 //! below 10⁻¹⁸ of the largest counts as that; over the length of the scene this shifts the ray by much less than u S.
 
+//!
+//! # Why no triangle is missed
+//!
+//! Heights count along the axis of the shear. With M the largest coordinate of a triangle relative to the ray's origin
+//! and R the largest sheared one, sheared coordinates are within 6 u M of exact, edge functions within 36 u M R, their
+//! sum (`area`) within 150 u M R, and their sum times heights (`moment`) within 170 u M² R; moment over area is the height
+//! of the hit. [`ROUNDING`] allows for 256 u: what is left over is more than the rounding of the limits and of `t`, as
+//! area ≤ 6 R² and R ≤ 2 M. [`TINY`] covers numbers so small that they are not rounded relatively. Lanes that may still
+//! be hit go to [`Shear::intersect`]; only whether there is *any* hit can be told without it, from the same bounds.
+
 use super::Primitive;
 use super::ray::Ray;
 use super::triangle::{Shear, TriangleHit};
@@ -108,6 +118,10 @@ struct Beam {
     /// Rows of [`Node::rows`] with the far planes.
     far_rows: [usize; 3],
     t_min: f32,
+    /// Length of the direction along its longest axis: turns distances into heights.
+    height: f32,
+    /// Sign of the direction along that axis: turns coordinates along it into heights.
+    ahead: f32,
 }
 
 impl Beam {
@@ -125,7 +139,10 @@ impl Beam {
             near_rows: [0; 3],
             far_rows: [0; 3],
             t_min: ray.t_min.max(0.0),
+            height: ray.d.abs().max_element(),
+            ahead: 0.0,
         };
+        beam.ahead = 1_f32.copysign(ray.d[beam.shear.axes[2]]);
         for axis in 0..3 {
             let d = if ray.d[axis].abs() < tiny { tiny.copysign(ray.d[axis]) } else { ray.d[axis] };
             let inv = 1.0 / d;
@@ -140,6 +157,20 @@ impl Beam {
     }
 }
 
+/// Bound on the error of `area`, over the largest coordinate and the largest sheared one.
+const ROUNDING: f32 = 128.0 * f32::EPSILON;
+/// See the module's description.
+const TINY: f32 = 1e-30;
+
+/// Lanes of a pack, one bit each.
+#[derive(Clone, Copy)]
+struct Candidates {
+    /// All that may be hit within the limits.
+    maybe: u32,
+    /// Those of them that are hit within the limits for certain.
+    sure: u32,
+}
+
 /// The two questions that take vector instructions.
 trait Kernel {
     /// One bit for each box that holds points of the ray between `t_min` and `t_max`; `near` gets the entry distances.
@@ -148,11 +179,11 @@ trait Kernel {
     /// The processor has the instructions of the kernel.
     unsafe fn boxes(beam: &Beam, node: &Node, t_max: f32, near: &mut [f32; WIDTH]) -> u32;
 
-    /// One bit for each triangle that the ray's line may hit.
+    /// One bit for each triangle that the ray may hit nearer than `t_max`; `near` gets lower bounds of their heights.
     ///
     /// # Safety
     /// The processor has the instructions of the kernel.
-    unsafe fn candidates(beam: &Beam, pack: &Pack) -> u32;
+    unsafe fn candidates(beam: &Beam, pack: &Pack, t_max: f32, near: &mut [f32; WIDTH]) -> Candidates;
 
     /// Asks for the first two cache lines of an item, which need not exist.
     #[inline(always)]
@@ -179,36 +210,43 @@ impl Kernel for Portable {
     }
 
     #[inline(always)]
-    unsafe fn candidates(beam: &Beam, pack: &Pack) -> u32 {
+    unsafe fn candidates(beam: &Beam, pack: &Pack, t_max: f32, near: &mut [f32; WIDTH]) -> Candidates {
         let Shear { o, axes, s, .. } = beam.shear;
-        let sheared = pack.vertices.each_ref().map(|rows| {
-            let (mut x, mut y) = ([0.0; WIDTH], [0.0; WIDTH]);
-            for i in 0..WIDTH {
-                let height = rows[axes[2]][i] - o[2];
-                x[i] = rows[axes[0]][i] - o[0] - s[0] * height;
-                y[i] = rows[axes[1]][i] - o[1] - s[1] * height;
-            }
-            (x, y)
-        });
-        let [a, b, c] = &sheared;
-        let mut mask = 0;
+        let [low, high] = [beam.t_min, t_max].map(|t| t * beam.height);
+        let mut found = Candidates { maybe: 0, sure: 0 };
         for i in 0..WIDTH {
-            let edges = [
-                c.0[i] * b.1[i] - c.1[i] * b.0[i],
-                a.0[i] * c.1[i] - a.1[i] * c.0[i],
-                b.0[i] * a.1[i] - b.1[i] * a.0[i],
-            ];
+            let (mut reach, mut extent, mut top) = (0.0_f32, 0.0_f32, 0.0_f32);
+            let [a, b, c] = pack.vertices.each_ref().map(|rows| {
+                let [x, y, z] = [0, 1, 2].map(|k| rows[axes[k]][i] - o[k]);
+                let p = [x - s[0] * z, y - s[1] * z, z * beam.ahead];
+                reach = reach.max(x.abs()).max(y.abs()).max(z.abs());
+                extent = extent.max(p[0].abs()).max(p[1].abs());
+                top = top.max(p[2]);
+                p
+            });
+            let edges = [c[0] * b[1] - c[1] * b[0], a[0] * c[1] - a[1] * c[0], b[0] * a[1] - b[1] * a[0]];
             let negative = (edges[0] < 0.0) | (edges[1] < 0.0) | (edges[2] < 0.0);
             let positive = (edges[0] > 0.0) | (edges[1] > 0.0) | (edges[2] > 0.0);
-            mask |= u32::from(!(negative & positive) & !edges[0].is_nan()) << i;
+            let side = if negative { -1.0 } else { 1.0 };
+            let area = (edges[0] + edges[1] + edges[2]) * side;
+            let moment = (edges[0] * a[2] + edges[1] * b[2] + edges[2] * c[2]) * side;
+            let area_error = reach * extent * ROUNDING + TINY;
+            let moment_error = area_error * reach + TINY;
+            near[i] = (moment - moment_error) / (area + area_error);
+            let beside = negative & positive;
+            let outside = (top <= 0.0) | (moment < -moment_error) | (near[i] > high);
+            let certain =
+                !edges.contains(&0.0) & (near[i] > low) & (moment + moment_error < high * (area - area_error));
+            found.maybe |= u32::from(!beside & !outside) << i;
+            found.sure |= u32::from(!beside & !outside & certain) << i;
         }
-        mask
+        found
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 mod avx2 {
-    use super::{Beam, Found, Kernel, Node, Pack, Ray, Shear, Tree, WIDTH, walk};
+    use super::{Beam, Candidates, Found, Kernel, Node, Pack, ROUNDING, Ray, TINY, Tree, WIDTH, walk};
     use std::arch::x86_64::*;
 
     pub fn is_available() -> bool {
@@ -241,9 +279,9 @@ mod avx2 {
         }
 
         #[inline(always)]
-        unsafe fn candidates(beam: &Beam, pack: &Pack) -> u32 {
+        unsafe fn candidates(beam: &Beam, pack: &Pack, t_max: f32, near: &mut [f32; WIDTH]) -> Candidates {
             // SAFETY: the caller vouches for the instructions.
-            unsafe { candidates(beam, pack) }
+            unsafe { candidates(beam, pack, t_max, near) }
         }
 
         #[inline(always)]
@@ -285,30 +323,68 @@ mod avx2 {
         _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(entry, exit)) as u32
     }
 
-    /// The vertices of one row triple, relative to the ray's origin and sheared.
+    /// A vertex of each triangle, relative to the ray's origin and sheared, with its height; and its largest coordinate.
     #[inline]
     #[target_feature(enable = "avx2,fma")]
-    fn sheared(rows: &[[f32; WIDTH]; 3], shear: &Shear) -> (__m256, __m256) {
+    fn sheared(rows: &[[f32; WIDTH]; 3], beam: &Beam) -> ([__m256; 3], __m256) {
+        let shear = &beam.shear;
         let relative = |i: usize| _mm256_sub_ps(load(&rows[shear.axes[i]]), _mm256_set1_ps(shear.o[i]));
-        let height = relative(2);
-        let moved = |i: usize| _mm256_sub_ps(relative(i), _mm256_mul_ps(_mm256_set1_ps(shear.s[i]), height));
-        (moved(0), moved(1))
+        let [x, y, z] = [relative(0), relative(1), relative(2)];
+        let moved = |p: __m256, s: f32| _mm256_sub_ps(p, _mm256_mul_ps(_mm256_set1_ps(s), z));
+        let ahead = _mm256_mul_ps(z, _mm256_set1_ps(beam.ahead));
+        ([moved(x, shear.s[0]), moved(y, shear.s[1]), ahead], _mm256_max_ps(_mm256_max_ps(abs(x), abs(y)), abs(z)))
     }
 
     #[inline]
     #[target_feature(enable = "avx2,fma")]
-    fn candidates(beam: &Beam, pack: &Pack) -> u32 {
-        let [a, b, c] = [0, 1, 2].map(|vertex| sheared(&pack.vertices[vertex], &beam.shear));
+    fn abs(a: __m256) -> __m256 {
+        _mm256_andnot_ps(_mm256_set1_ps(-0.0), a)
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx2,fma")]
+    fn candidates(beam: &Beam, pack: &Pack, t_max: f32, near: &mut [f32; WIDTH]) -> Candidates {
+        let [(a, a_reach), (b, b_reach), (c, c_reach)] = [0, 1, 2].map(|vertex| sheared(&pack.vertices[vertex], beam));
         let cross =
-            |p: (__m256, __m256), q: (__m256, __m256)| _mm256_sub_ps(_mm256_mul_ps(p.0, q.1), _mm256_mul_ps(p.1, q.0));
+            |p: [__m256; 3], q: [__m256; 3]| _mm256_sub_ps(_mm256_mul_ps(p[0], q[1]), _mm256_mul_ps(p[1], q[0]));
         let [u, v, w] = [cross(c, b), cross(a, c), cross(b, a)];
         let zero = _mm256_setzero_ps();
-        let negative = |e: __m256| _mm256_cmp_ps::<_CMP_LT_OQ>(e, zero);
-        let positive = |e: __m256| _mm256_cmp_ps::<_CMP_GT_OQ>(e, zero);
-        let any_negative = _mm256_or_ps(_mm256_or_ps(negative(u), negative(v)), negative(w));
-        let any_positive = _mm256_or_ps(_mm256_or_ps(positive(u), positive(v)), positive(w));
-        let occupied = _mm256_cmp_ps::<_CMP_ORD_Q>(u, u);
-        _mm256_movemask_ps(_mm256_andnot_ps(_mm256_and_ps(any_negative, any_positive), occupied)) as u32
+        let max = |a: __m256, b: __m256, c: __m256| _mm256_max_ps(_mm256_max_ps(a, b), c);
+        let min = |a: __m256, b: __m256, c: __m256| _mm256_min_ps(_mm256_min_ps(a, b), c);
+        let any_negative = _mm256_cmp_ps::<_CMP_LT_OQ>(min(u, v, w), zero);
+        let any_positive = _mm256_cmp_ps::<_CMP_GT_OQ>(max(u, v, w), zero);
+        let beside = _mm256_and_ps(any_negative, any_positive);
+        let inside = _mm256_andnot_ps(beside, _mm256_cmp_ps::<_CMP_GT_OQ>(max(a[2], b[2], c[2]), zero));
+        if _mm256_testz_ps(inside, inside) != 0 {
+            return Candidates { maybe: 0, sure: 0 };
+        }
+
+        let sign = _mm256_and_ps(any_negative, _mm256_set1_ps(-0.0));
+        let area = _mm256_xor_ps(_mm256_add_ps(_mm256_add_ps(u, v), w), sign);
+        let moment = _mm256_fmadd_ps(u, a[2], _mm256_fmadd_ps(v, b[2], _mm256_mul_ps(w, c[2])));
+        let moment = _mm256_xor_ps(moment, sign);
+        let extent = |i: usize| max(abs(a[i]), abs(b[i]), abs(c[i]));
+        let extent = _mm256_max_ps(extent(0), extent(1));
+        let reach = max(a_reach, b_reach, c_reach);
+        let tiny = _mm256_set1_ps(TINY);
+        let area_error = _mm256_fmadd_ps(_mm256_mul_ps(reach, _mm256_set1_ps(ROUNDING)), extent, tiny);
+        let moment_error = _mm256_fmadd_ps(area_error, reach, tiny);
+
+        let [low, high] = [beam.t_min, t_max].map(|t| _mm256_set1_ps(t * beam.height));
+        let least = _mm256_sub_ps(moment, moment_error);
+        let most = _mm256_add_ps(moment, moment_error);
+        let nearest = _mm256_div_ps(least, _mm256_add_ps(area, area_error));
+        // SAFETY: `near` is eight floats; no alignment is asked for.
+        unsafe { _mm256_storeu_ps(near.as_mut_ptr(), nearest) };
+        let behind = _mm256_cmp_ps::<_CMP_LT_OQ>(most, zero);
+        let beyond = _mm256_cmp_ps::<_CMP_GT_OQ>(nearest, high);
+        let maybe = _mm256_andnot_ps(_mm256_or_ps(behind, beyond), inside);
+        let ends = _mm256_cmp_ps::<_CMP_LT_OQ>(most, _mm256_mul_ps(high, _mm256_sub_ps(area, area_error)));
+        let begins = _mm256_cmp_ps::<_CMP_GT_OQ>(nearest, low);
+        let smallest = min(abs(u), abs(v), abs(w));
+        let off_edges = _mm256_cmp_ps::<_CMP_GT_OQ>(smallest, zero);
+        let sure = _mm256_and_ps(_mm256_and_ps(maybe, ends), _mm256_and_ps(begins, off_edges));
+        Candidates { maybe: _mm256_movemask_ps(maybe) as u32, sure: _mm256_movemask_ps(sure) as u32 }
     }
 }
 
@@ -411,12 +487,19 @@ fn walk<K: Kernel, const ANY: bool>(tree: &Tree, ray: &Ray) -> Option<Found> {
         } else {
             let pack = &tree.packs[word.index()];
             // SAFETY: as above.
-            let mut mask = unsafe { K::candidates(&beam, pack) };
+            let Candidates { maybe: mut mask, sure } = unsafe { K::candidates(&beam, pack, best.t, &mut near) };
+            if ANY && sure != 0 {
+                let id = pack.ids[sure.trailing_zeros() as usize & (WIDTH - 1)];
+                return Some(Found { t: 0.0, u: 0.0, v: 0.0, id, part: None });
+            }
             while mask != 0 {
                 let lane = mask.trailing_zeros() as usize & (WIDTH - 1);
                 mask &= mask - 1;
-                let triangle = pack.vertices.each_ref().map(|rows| rows.each_ref().map(|row| row[lane]));
-                if let Some(TriangleHit { t, u, v }) = beam.shear.intersect(triangle) {
+                if near[lane] > best.t * beam.height {
+                    continue;
+                }
+                let points = pack.vertices.each_ref().map(|rows| beam.shear.axes.map(|axis| rows[axis][lane]));
+                if let Some(TriangleHit { t, u, v }) = beam.shear.intersect(points) {
                     best.offer(beam.t_min, Found { t, u, v, id: pack.ids[lane], part: None });
                     if ANY && best.found.is_some() {
                         return best.found;

@@ -8,10 +8,11 @@
 //! | Step | Woop et al. | here |
 //! |---|---|---|
 //! | shear | `f32` | the same, without fused operations, so that every machine rounds alike |
-//! | edge functions | `f32`; `f64` if one is 0 | `f32` for eight triangles at once, as a filter; exact (`f64`) for what passes |
+//! | edge functions | `f32`; `f64` if one is 0 | the same, after a filter for eight triangles at once |
 //! | distance, weights | `f32` | `f64` from unrounded points, with weights clamped into the triangle: one final rounding |
 
 use glam::Vec3;
+use std::ops::{Mul, Sub};
 
 /// The part of a ray that the triangle test needs.
 #[derive(Clone, Copy, Debug)]
@@ -55,19 +56,28 @@ impl Shear {
         Self { o: axes.map(|a| o[a]), axes, s: s64.map(|s| s as f32), s64, inv_dz }
     }
 
-    /// The intersection with a triangle, whatever its distance; `None` if the ray passes beside it or in its plane.
+    /// The corners of a triangle with their coordinates in the order of [`axes`](Self::axes).
+    #[cfg(test)]
     #[must_use]
-    pub fn intersect(&self, triangle: [[f32; 3]; 3]) -> Option<TriangleHit> {
-        let [x, y, z] = self.axes;
-        let points = triangle.map(|p| [p[x], p[y], p[z]]);
+    pub fn permuted(&self, triangle: [Vec3; 3]) -> [[f32; 3]; 3] {
+        triangle.map(|p| self.axes.map(|axis| p[axis]))
+    }
 
-        // Products of two f32 are exact in f64, and the sign of a difference of f64 is exact.
+    /// The intersection with a triangle, whatever its distance; `None` if the ray passes beside it or in its plane.
+    /// Coordinates of the corners are in the order of [`axes`](Self::axes).
+    #[inline(always)]
+    #[must_use]
+    pub fn intersect(&self, points: [[f32; 3]; 3]) -> Option<TriangleHit> {
         let rounded = points.map(|p| {
             let [px, py, pz] = [p[0] - self.o[0], p[1] - self.o[1], p[2] - self.o[2]];
-            [f64::from(px - self.s[0] * pz), f64::from(py - self.s[1] * pz)]
+            [px - self.s[0] * pz, py - self.s[1] * pz]
         });
+        // Rounding products keeps their order, so the sign of a difference is exact unless it is 0 (or overflows).
         let edges = edge_functions(rounded);
-        let [any_positive, any_negative] = [edges.iter().any(|&e| e > 0.0), edges.iter().any(|&e| e < 0.0)];
+        let [mut any_positive, mut any_negative] = [edges.iter().any(|&e| e > 0.0), edges.iter().any(|&e| e < 0.0)];
+        if !edges.iter().all(|e| e.abs() > 0.0) {
+            [any_positive, any_negative] = exact_signs(rounded);
+        }
         if any_positive == any_negative {
             return None;
         }
@@ -84,7 +94,7 @@ impl Shear {
         let mut sum = weights[0] + weights[1] + weights[2];
         if sum.is_nan() || sum <= 0.0 {
             // Seen edge-on up to the precision of f64, but not once rounded: the ray must not slip through here.
-            weights = edges.map(f64::abs);
+            weights = exact_edge_functions(rounded).map(f64::abs);
             sum = weights[0] + weights[1] + weights[2];
         }
         let scale = 1.0 / sum;
@@ -94,9 +104,22 @@ impl Shear {
     }
 }
 
+/// Whether any edge function is positive, and whether any is negative.
+#[cold]
+fn exact_signs(rounded: [[f32; 2]; 3]) -> [bool; 2] {
+    let edges = exact_edge_functions(rounded);
+    [edges.iter().any(|&e| e > 0.0), edges.iter().any(|&e| e < 0.0)]
+}
+
+/// Products of two `f32` are exact in `f64`, and so is the sign of their difference.
+#[cold]
+fn exact_edge_functions(rounded: [[f32; 2]; 3]) -> [f64; 3] {
+    edge_functions(rounded.map(|p| p.map(f64::from)))
+}
+
 /// Twice the signed areas that the origin spans with the edges opposite each vertex.
 #[inline(always)]
-fn edge_functions([a, b, c]: [[f64; 2]; 3]) -> [f64; 3] {
+fn edge_functions<F: Copy + Mul<Output = F> + Sub<Output = F>>([a, b, c]: [[F; 2]; 3]) -> [F; 3] {
     [c[0] * b[1] - c[1] * b[0], a[0] * c[1] - a[1] * c[0], b[0] * a[1] - b[1] * a[0]]
 }
 
@@ -115,10 +138,11 @@ mod tests {
     #[test]
     fn distance_and_weights_of_a_known_hit() {
         let shear = Shear::new(Vec3::new(0.25, 0.5, -3.0), Vec3::new(0.0, 0.0, 2.0));
-        let hit = shear.intersect([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]]);
+        let triangle = [Vec3::Z, Vec3::new(1.0, 0.0, 1.0), Vec3::new(0.0, 1.0, 1.0)];
+        let hit = shear.intersect(shear.permuted(triangle));
         assert_eq!(hit, Some(TriangleHit { t: 2.0, u: 0.25, v: 0.5 }));
         let beside = Shear::new(Vec3::new(0.6, 0.5, -3.0), Vec3::Z);
-        assert_eq!(beside.intersect([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]]), None);
+        assert_eq!(beside.intersect(beside.permuted(triangle)), None);
     }
 
     #[test]
@@ -133,7 +157,8 @@ mod tests {
             let mut point = || Vec3::new(next(), next(), next()) * 100.0;
             let [o, a, b, c] = [point(), point(), point(), point()];
             let d = (a + b + c) / 3.0 - o;
-            let Some(hit) = Shear::new(o, d).intersect([a, b, c].map(<[f32; 3]>::from)) else { continue };
+            let shear = Shear::new(o, d);
+            let Some(hit) = shear.intersect(shear.permuted([a, b, c])) else { continue };
             let [o, d, a, b, c] = [o, d, a, b, c].map(|p| p.as_dvec3());
             let n = (b - a).cross(c - a);
             let exact = n.dot(a - o) / n.dot(d);

@@ -21,27 +21,34 @@ pub const fn gamma(n: u32) -> f32 {
 /// points to, out of the box of half size `p_error`, then rounded away from the surface.
 #[inline]
 pub fn offset_origin(p: Vec3, p_error: Vec3, n: Vec3, d: Vec3) -> Vec3 {
-    let distance = n.abs().dot(p_error);
-    let away = if d.dot(n) < 0.0 { -n } else { n };
-    let offset = away * distance;
+    let offset = n * n.abs().dot(p_error).copysign(d.dot(n));
     let start = p + offset;
     Vec3::new(round_away(start.x, offset.x), round_away(start.y, offset.y), round_away(start.z, offset.z))
 }
 
+/// The next number towards `direction`, or `x` itself where that is 0. Both are finite. Without branches.
 #[inline]
 fn round_away(x: f32, direction: f32) -> f32 {
-    if direction > 0.0 {
-        x.next_up()
-    } else if direction < 0.0 {
-        x.next_down()
-    } else {
-        x
-    }
+    let x = if x == 0.0 { 0_f32.copysign(direction) } else { x };
+    // Bits of positive numbers grow with the number, those of negative ones shrink.
+    let outwards = i32::from((x > 0.0) == (direction > 0.0) || x == 0.0) * 2 - 1;
+    let step = if direction == 0.0 { 0 } else { outwards };
+    f32::from_bits(x.to_bits().wrapping_add_signed(step))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rounds_to_the_next_number() {
+        for x in [0.0, -0.0, 1.0, -1.0, 1e-45, -1e-45, 1e10, -3.3e-39] {
+            assert_eq!(round_away(x, 2.0), x.next_up(), "{x}");
+            assert_eq!(round_away(x, -1e-30), x.next_down(), "{x}");
+            assert_eq!(round_away(x, 0.0), x);
+            assert_eq!(round_away(x, -0.0), x);
+        }
+    }
 
     #[test]
     fn leaves_on_the_right_side() {

@@ -8,6 +8,10 @@ use crate::math::ONE_MINUS_EPSILON;
 pub struct Discrete {
     /// `cdf[i]` is the sum of all weights up to and including `i`.
     cdf: Vec<f64>,
+    /// For each of 2ᵏ equal parts of [0, 1] and its end: the first entry whose sum is beyond the part's beginning. So a
+    /// search looks at few entries, however many there are (Chen and Asau 1974, "On generating random variates from an
+    /// empirical distribution").
+    guide: Vec<u32>,
     first: u32,
     last: u32,
 }
@@ -29,7 +33,14 @@ impl Discrete {
         }
         let first = cdf.partition_point(|&c| c <= 0.0) as u32;
         let last = cdf.partition_point(|&c| c < sum) as u32;
-        Some(Discrete { cdf, first, last })
+        let parts = cdf.len().next_power_of_two();
+        let mut at = 0;
+        let guide = (0..=parts).map(|part| {
+            let target = part as f64 / parts as f64 * sum;
+            at += cdf[at..].iter().take_while(|&&c| c <= target).count();
+            at as u32
+        });
+        Some(Discrete { guide: guide.collect(), cdf, first, last })
     }
 
     /// Number of entries.
@@ -63,7 +74,12 @@ impl Discrete {
     #[inline]
     pub fn sample(&self, u: f32) -> u32 {
         let target = f64::from(u) * self.sum();
-        (self.cdf.partition_point(|&c| c <= target) as u32).clamp(self.first, self.last)
+        // Exact, since the number of parts is a power of two: the entry is where a search over all would find it.
+        let parts = self.guide.len() - 1;
+        let part = ((f64::from(u) * parts as f64) as usize).min(parts - 1);
+        let [begin, end] = [self.guide[part], self.guide[part + 1]].map(|i| i as usize);
+        let index = begin + self.cdf[begin..end].partition_point(|&c| c <= target);
+        (index as u32).clamp(self.first, self.last)
     }
 
     /// As [`sample`](Self::sample), with the part of `u` that was not used stretched to [0, 1).
@@ -90,5 +106,20 @@ mod tests {
         let (index, rest) = d.sample_reuse(0.625);
         assert_eq!((index, rest), (3, 0.5));
         assert!(Discrete::new([0.0, 0.0]).is_none());
+    }
+
+    #[test]
+    fn the_guide_leads_where_a_full_search_does() {
+        let mut pcg = crate::sampling::Pcg32::new(1, 2);
+        for len in [1, 2, 3, 7, 64, 1000] {
+            let weights: Vec<f64> = (0..len).map(|_| f64::from(pcg.next_f32().powi(8))).collect();
+            let d = Discrete::new(weights).unwrap();
+            for i in 0..2000 {
+                let u = if i < 1000 { i as f32 / 1000.0 } else { pcg.next_f32() };
+                let target = f64::from(u) * d.sum();
+                let full = d.cdf.partition_point(|&c| c <= target) as u32;
+                assert_eq!(d.sample(u), full.clamp(d.first, d.last), "{len} {u}");
+            }
+        }
     }
 }

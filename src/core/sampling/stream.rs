@@ -18,11 +18,17 @@ pub trait PointSet: Send + Sync {
 }
 
 /// The stream of numbers in [0, 1) that a pixel sample consumes.
-///
+pub struct Stream<'a>(Source<'a>);
+
 /// Independent numbers come straight from a [`Pcg32`]; anything else comes from a [`PointSet`] in blocks.
-pub struct Stream<'a> {
-    pcg: Pcg32,
-    points: Option<&'a dyn PointSet>,
+#[allow(clippy::large_enum_variant)] // lives on the stack, for one pixel sample
+enum Source<'a> {
+    Independent(Pcg32),
+    Structured(Blocks<'a>),
+}
+
+struct Blocks<'a> {
+    points: &'a dyn PointSet,
     pixel: UVec2,
     sample: u32,
     singles: [f32; BLOCK],
@@ -33,18 +39,14 @@ pub struct Stream<'a> {
 
 impl<'a> Stream<'a> {
     /// Independent numbers.
+    #[inline]
     pub fn independent(pcg: Pcg32) -> Self {
-        Self::with(pcg, None, UVec2::ZERO, 0)
+        Stream(Source::Independent(pcg))
     }
 
     /// Numbers of a point set.
     pub fn structured(points: &'a dyn PointSet, pixel: UVec2, sample: u32) -> Self {
-        Self::with(Pcg32::new(0, 0), Some(points), pixel, sample)
-    }
-
-    fn with(pcg: Pcg32, points: Option<&'a dyn PointSet>, pixel: UVec2, sample: u32) -> Self {
-        Stream {
-            pcg,
+        Stream(Source::Structured(Blocks {
             points,
             pixel,
             sample,
@@ -52,41 +54,47 @@ impl<'a> Stream<'a> {
             pairs: [Vec2::ZERO; BLOCK],
             next_single: 0,
             next_pair: 0,
-        }
+        }))
     }
 
     /// The next number.
     #[inline]
     pub fn next_1d(&mut self) -> f32 {
-        match self.points {
-            None => self.pcg.next_f32(),
-            Some(points) => {
-                let slot = self.next_single as usize % BLOCK;
-                if slot == 0 {
-                    points.singles(self.pixel, self.sample, self.next_single, &mut self.singles);
-                }
-                self.next_single += 1;
-                self.singles[slot]
-            }
+        match &mut self.0 {
+            Source::Independent(pcg) => pcg.next_f32(),
+            Source::Structured(blocks) => blocks.next_1d(),
         }
     }
 
     /// The next pair; of independent numbers, x is drawn first.
     #[inline]
     pub fn next_2d(&mut self) -> Vec2 {
-        match self.points {
-            None => {
-                let x = self.pcg.next_f32();
-                Vec2::new(x, self.pcg.next_f32())
+        match &mut self.0 {
+            Source::Independent(pcg) => {
+                let x = pcg.next_f32();
+                Vec2::new(x, pcg.next_f32())
             }
-            Some(points) => {
-                let slot = self.next_pair as usize % BLOCK;
-                if slot == 0 {
-                    points.pairs(self.pixel, self.sample, self.next_pair, &mut self.pairs);
-                }
-                self.next_pair += 1;
-                self.pairs[slot]
-            }
+            Source::Structured(blocks) => blocks.next_2d(),
         }
+    }
+}
+
+impl Blocks<'_> {
+    fn next_1d(&mut self) -> f32 {
+        let slot = self.next_single as usize % BLOCK;
+        if slot == 0 {
+            self.points.singles(self.pixel, self.sample, self.next_single, &mut self.singles);
+        }
+        self.next_single += 1;
+        self.singles[slot]
+    }
+
+    fn next_2d(&mut self) -> Vec2 {
+        let slot = self.next_pair as usize % BLOCK;
+        if slot == 0 {
+            self.points.pairs(self.pixel, self.sample, self.next_pair, &mut self.pairs);
+        }
+        self.next_pair += 1;
+        self.pairs[slot]
     }
 }

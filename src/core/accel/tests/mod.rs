@@ -126,7 +126,7 @@ fn brute_force(meshes: &[&Mesh], ray: &Ray) -> Option<Hit> {
             if !is_hittable(corners) {
                 continue;
             }
-            let Some(hit) = shear.intersect(corners.map(<[f32; 3]>::from)) else { continue };
+            let Some(hit) = shear.intersect(shear.permuted(corners)) else { continue };
             if hit.t > ray.t_min && hit.t < best.map_or(ray.t_max, |b| b.t) {
                 let (shape, prim) = (shape as u32, prim as u32);
                 best = Some(Hit { t: hit.t, u: hit.u, v: hit.v, shape, prim, instance: NO_INSTANCE });
@@ -160,6 +160,15 @@ fn hc_g18_every_builder_and_path_equals_brute_force_bit_for_bit() {
             for (accel, options) in accels.iter().zip(&ALL) {
                 assert_eq!(accel.intersect(&ray), expected, "{options:?} {ray:?}");
                 assert_eq!(accel.occluded(&ray), expected.is_some(), "{options:?} {ray:?}");
+                // Limits at the very hit: it lies neither before it nor after it.
+                let Some(hit) = expected else { continue };
+                assert!(!accel.occluded(&Ray { t_max: hit.t, ..ray }), "{options:?} {ray:?}");
+                assert!(accel.occluded(&Ray { t_max: hit.t.next_up(), ..ray }), "{options:?} {ray:?}");
+                assert!(accel.occluded(&Ray { t_min: hit.t.next_down(), ..ray }), "{options:?} {ray:?}");
+                let beyond = Ray { t_min: hit.t, ..ray };
+                let expected = brute_force(&[&a, &b], &beyond);
+                assert_eq!(accel.intersect(&beyond), expected, "{options:?} {beyond:?}");
+                assert_eq!(accel.occluded(&beyond), expected.is_some(), "{options:?} {beyond:?}");
             }
         }
     }
@@ -239,6 +248,7 @@ fn hits_at_every_scale_equal_brute_force() {
             for accel in &accels {
                 let hit = accel.intersect(&ray);
                 assert_eq!(hit, expected, "{ray:?}");
+                assert_eq!(accel.occluded(&ray), expected.is_some(), "{ray:?}");
             }
         }
     }
@@ -258,7 +268,8 @@ fn hc_g03_rays_leaving_a_triangle_by_its_error_bound_do_not_return() {
         if !is_hittable(corners) {
             continue;
         }
-        let Some(hit) = Shear::new(o, target - o).intersect(corners.map(<[f32; 3]>::from)) else { continue };
+        let shear = Shear::new(o, target - o);
+        let Some(hit) = shear.intersect(shear.permuted(corners)) else { continue };
         let parts = [corners[0] * (1.0 - hit.u - hit.v), corners[1] * hit.u, corners[2] * hit.v];
         let p = parts[0] + parts[1] + parts[2];
         let error = (parts[0].abs() + parts[1].abs() + parts[2].abs()) * gamma_7;
@@ -277,7 +288,8 @@ fn hc_g03_rays_leaving_a_triangle_by_its_error_bound_do_not_return() {
         for _ in 0..4 {
             let mut d = random.vector();
             d *= d.dot(n).signum();
-            let again = Shear::new(start, d).intersect(corners.map(<[f32; 3]>::from));
+            let shear = Shear::new(start, d);
+            let again = shear.intersect(shear.permuted(corners));
             assert!(again.is_none_or(|hit| hit.t <= 0.0), "{corners:?} {start:?} {d:?} {again:?}");
             left += 1;
         }
