@@ -20,8 +20,11 @@ const APART: &[(&str, &str)] = &[
         "inside a sphere the reference misjudges the density of hits: 1.508 at depth 2, not 1.5",
     ),
     ("emitters/area_mesh", "the reference's density has the smooth normal's cosine: 0.8 % of the light lost beside it"),
+    (
+        "integrators/aov_uv_differentials",
+        "the reference starts offset rays where the central one leaves the near plane: 0.27 % here",
+    ),
     ("emitters/sunsky", "sun and sky are sampled in another way"),
-    ("integrators/aov_uv_differentials", "no ray differentials are followed"),
     ("textures/bitmap_formats", "the JPEG decoders enlarge the chroma differently; the other formats agree"),
 ];
 

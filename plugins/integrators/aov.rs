@@ -6,8 +6,8 @@
 //! | nested integrators | | | any number; channels `<name>.R .G .B .A`, before all others |
 //!
 //! Types and channels: `albedo` (`.R .G .B`), `depth` (`.T`, as the integrator `depth`), `position`, `geo_normal`,
-//! `sh_normal`, `dp_du`, `dp_dv` (`.X .Y .Z`), `uv`, `duv_dx`, `duv_dy` (`.U .V`, the latter two 0: no differentials
-//! are followed), `prim_index`, `shape_index` (`.I`; shapes count from 1 in file order, 0 is the background). All are 0
+//! `sh_normal`, `dp_du`, `dp_dv` (`.X .Y .Z`), `uv`, `duv_dx`, `duv_dy` (`.U .V`, the latter two for a step of one
+//! pixel over the square root of the samples per pixel), `prim_index`, `shape_index` (`.I`; shapes count from 1 in file order, 0 is the background). All are 0
 //! where nothing is hit. Indices are filtered like colours: use a box filter. The picture's colour is that of the
 //! first nested integrator, black without one.
 //!
@@ -20,7 +20,8 @@
 
 use super::common::{COMMON, HIDE_IGNORED, timeout};
 use lucerna_core::accel::Ray;
-use lucerna_core::interfaces::{Arena, Integrator, Radiance, RadianceEstimator, SurfaceHit};
+use lucerna_core::interfaces::{Arena, CameraRay, Integrator, Radiance, RadianceEstimator, SurfaceHit};
+use lucerna_core::math::Vec2;
 use lucerna_core::render::{RenderContext, RenderError, Report, render_estimator};
 use lucerna_core::sampling::Stream;
 use lucerna_core::scene::{Built, Constructor, ObjectKind, Param, Plugin, Properties, Scene, did_you_mean};
@@ -135,10 +136,15 @@ impl Integrator for Aov {
 }
 
 impl RadianceEstimator for Aov {
+    fn wants_differentials(&self) -> bool {
+        let own = self.kinds.iter().any(|kind| matches!(kind, Kind::DuvDx | Kind::DuvDy));
+        own || self.nested.iter().any(|(i, _)| i.estimator().is_some_and(RadianceEstimator::wants_differentials))
+    }
+
     fn radiance(
         &self,
         scene: &Scene,
-        ray: &Ray,
+        camera: &CameraRay,
         stream: &mut Stream<'_>,
         arena: &mut Arena,
         aovs: &mut [f32],
@@ -149,7 +155,7 @@ impl RadianceEstimator for Aov {
             let (own, others) = rest.split_at_mut(*own);
             rest = others;
             let Some(estimator) = integrator.estimator() else { continue };
-            let inner = estimator.radiance(scene, ray, stream, arena, own);
+            let inner = estimator.radiance(scene, camera, stream, arena, own);
             images[4 * i..4 * i + 3].copy_from_slice(&inner.rgb.to_array());
             images[4 * i + 3] = inner.alpha;
             found.rays += inner.rays;
@@ -158,10 +164,10 @@ impl RadianceEstimator for Aov {
             }
         }
         found.rays += 1;
-        let Some(hit) = scene.intersect_surface(ray) else { return found };
+        let Some(hit) = scene.intersect_surface(&camera.ray) else { return found };
         for kind in &self.kinds {
             let (out, others) = rest.split_at_mut(channels(*kind));
-            write(*kind, scene, &hit, arena, out);
+            write(*kind, scene, camera, &hit, arena, out);
             rest = others;
         }
         found
@@ -172,7 +178,7 @@ fn channels(kind: Kind) -> usize {
     KINDS.iter().find(|(_, k, _)| *k == kind).map_or(0, |(.., suffixes)| suffixes.len())
 }
 
-fn write(kind: Kind, scene: &Scene, hit: &SurfaceHit, arena: &Arena, out: &mut [f32]) {
+fn write(kind: Kind, scene: &Scene, camera: &CameraRay, hit: &SurfaceHit, arena: &Arena, out: &mut [f32]) {
     match kind {
         Kind::Albedo => out.copy_from_slice(&scene.bsdf(hit).diffuse_reflectance(hit, arena).to_array()),
         Kind::Depth => out[0] = hit.t,
@@ -182,8 +188,21 @@ fn write(kind: Kind, scene: &Scene, hit: &SurfaceHit, arena: &Arena, out: &mut [
         Kind::ShNormal => out.copy_from_slice(&hit.frame.n.to_array()),
         Kind::DpDu => out.copy_from_slice(&hit.dp_du.to_array()),
         Kind::DpDv => out.copy_from_slice(&hit.dp_dv.to_array()),
-        Kind::DuvDx | Kind::DuvDy => out.fill(0.0),
+        Kind::DuvDx => out.copy_from_slice(&uv_change(hit, camera.offsets.map(|o| o[0])).to_array()),
+        Kind::DuvDy => out.copy_from_slice(&uv_change(hit, camera.offsets.map(|o| o[1])).to_array()),
         Kind::PrimIndex => out[0] = hit.prim as f32,
         Kind::ShapeIndex => out[0] = (hit.shape + 1) as f32,
     }
+}
+
+/// How far the texture coordinates are from those of the hit where an offset ray meets the tangent plane: the least
+/// squares solution of `dp = dp_du · du + dp_dv · dv` (Igehy 1999, "Tracing ray differentials"; zero where it has none).
+fn uv_change(hit: &SurfaceHit, offset: Option<Ray>) -> Vec2 {
+    let Some(ray) = offset else { return Vec2::ZERO };
+    let t = hit.n.dot(hit.p - ray.o) / hit.n.dot(ray.d);
+    let dp = ray.o + ray.d * t - hit.p;
+    let (a00, a01, a11) = (hit.dp_du.dot(hit.dp_du), hit.dp_du.dot(hit.dp_dv), hit.dp_dv.dot(hit.dp_dv));
+    let (b0, b1) = (hit.dp_du.dot(dp), hit.dp_dv.dot(dp));
+    let change = Vec2::new(a11 * b0 - a01 * b1, a00 * b1 - a01 * b0) / (a00 * a11 - a01 * a01);
+    if change.is_finite() { change } else { Vec2::ZERO }
 }

@@ -8,9 +8,8 @@
 //! ```
 
 use super::common::{COMMON, HIDE_IGNORED, forward_integrator, timeout};
-use lucerna_core::accel::Ray;
 use lucerna_core::color::Rgb;
-use lucerna_core::interfaces::{Arena, Integrator, Radiance, RadianceEstimator};
+use lucerna_core::interfaces::{Arena, CameraRay, Integrator, Radiance, RadianceEstimator};
 use lucerna_core::sampling::Stream;
 use lucerna_core::scene::{Built, Constructor, Plugin, Properties, Scene};
 use std::sync::Arc;
@@ -35,8 +34,15 @@ struct Depth {
 forward_integrator!(Depth);
 
 impl RadianceEstimator for Depth {
-    fn radiance(&self, scene: &Scene, ray: &Ray, _: &mut Stream<'_>, _: &mut Arena, _: &mut [f32]) -> Radiance {
-        match scene.intersect(ray) {
+    fn radiance(
+        &self,
+        scene: &Scene,
+        camera: &CameraRay,
+        _: &mut Stream<'_>,
+        _: &mut Arena,
+        _: &mut [f32],
+    ) -> Radiance {
+        match scene.intersect(&camera.ray) {
             Some(hit) => Radiance { rgb: Rgb::splat(hit.t), alpha: 1.0, rays: 1 },
             None => Radiance { rays: 1, ..Radiance::default() },
         }

@@ -22,7 +22,9 @@ use super::common::{
 };
 use lucerna_core::accel::Ray;
 use lucerna_core::color::Rgb;
-use lucerna_core::interfaces::{Arena, Integrator, LightPoint, Lobes, Radiance, RadianceEstimator, Transport};
+use lucerna_core::interfaces::{
+    Arena, CameraRay, Integrator, LightPoint, Lobes, Radiance, RadianceEstimator, Transport,
+};
 use lucerna_core::sampling::Stream;
 use lucerna_core::scene::{Built, Constructor, Param, Plugin, Properties, Scene};
 use std::sync::Arc;
@@ -72,11 +74,12 @@ impl RadianceEstimator for Direct {
     fn radiance(
         &self,
         scene: &Scene,
-        ray: &Ray,
+        camera: &CameraRay,
         stream: &mut Stream<'_>,
         arena: &mut Arena,
         _aovs: &mut [f32],
     ) -> Radiance {
+        let ray = &camera.ray;
         let mut found = Radiance::default();
         let hit = if self.hide_emitters {
             first_hit_without_light(scene, ray, &mut found.rays)

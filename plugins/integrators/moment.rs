@@ -10,9 +10,8 @@
 //! ```
 
 use super::common::{COMMON, HIDE_IGNORED, timeout};
-use lucerna_core::accel::Ray;
 use lucerna_core::color::Rgb;
-use lucerna_core::interfaces::{Arena, Integrator, Radiance, RadianceEstimator};
+use lucerna_core::interfaces::{Arena, CameraRay, Integrator, Radiance, RadianceEstimator};
 use lucerna_core::render::{RenderContext, RenderError, Report, render_estimator};
 use lucerna_core::sampling::Stream;
 use lucerna_core::scene::{Built, Constructor, ObjectKind, Param, Plugin, Properties, Scene};
@@ -70,10 +69,14 @@ impl Integrator for Moment {
 }
 
 impl RadianceEstimator for Moment {
+    fn wants_differentials(&self) -> bool {
+        self.nested.iter().any(|(i, _)| i.estimator().is_some_and(RadianceEstimator::wants_differentials))
+    }
+
     fn radiance(
         &self,
         scene: &Scene,
-        ray: &Ray,
+        camera: &CameraRay,
         stream: &mut Stream<'_>,
         arena: &mut Arena,
         aovs: &mut [f32],
@@ -84,7 +87,7 @@ impl RadianceEstimator for Moment {
         let mut at = 0;
         for (integrator, own) in &self.nested {
             let Some(estimator) = integrator.estimator() else { continue };
-            let found = estimator.radiance(scene, ray, stream, arena, &mut values[at..at + own]);
+            let found = estimator.radiance(scene, camera, stream, arena, &mut values[at..at + own]);
             at += own;
             values[at..at + 3].copy_from_slice(&found.rgb.to_xyz());
             at += 3;

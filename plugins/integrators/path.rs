@@ -24,7 +24,7 @@ use super::common::{
 use lucerna_core::accel::Ray;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{
-    Arena, Bxdf, Integrator, LightSample, Lobes, Radiance, RadianceEstimator, SurfaceHit, Transport,
+    Arena, Bxdf, CameraRay, Integrator, LightSample, Lobes, Radiance, RadianceEstimator, SurfaceHit, Transport,
 };
 use lucerna_core::sampling::Stream;
 use lucerna_core::scene::{Built, Constructor, Plugin, Properties, Scene};
@@ -54,7 +54,7 @@ impl RadianceEstimator for Path {
     fn radiance(
         &self,
         scene: &Scene,
-        ray: &Ray,
+        camera: &CameraRay,
         stream: &mut Stream<'_>,
         arena: &mut Arena,
         _aovs: &mut [f32],
@@ -66,7 +66,7 @@ impl RadianceEstimator for Path {
         }
         let visible_environment = !hide_emitters && scene.environment().is_some();
         found.alpha = f32::from(visible_environment);
-        let mut ray = *ray;
+        let mut ray = camera.ray;
         let mut throughput = Rgb::WHITE;
         let mut eta = 1.0;
         // Of the vertex before; none at the camera and after a delta lobe, where light sampling has no part.

@@ -1,7 +1,6 @@
 //! Light transport.
 
-use super::Arena;
-use crate::accel::Ray;
+use super::{Arena, CameraRay};
 use crate::color::Rgb;
 use crate::render::{RenderContext, RenderError, Report};
 use crate::sampling::Stream;
@@ -42,12 +41,17 @@ pub struct Radiance {
 /// A forward estimator without state between samples; the pass loop is shared
 /// ([`crate::render::render_estimator`]).
 pub trait RadianceEstimator: Send + Sync {
-    /// Unbiased estimate of the radiance along `ray`. `aovs` has as many entries as
+    /// Whether it reads [`CameraRay::offsets`]; nobody else pays for them.
+    fn wants_differentials(&self) -> bool {
+        false
+    }
+
+    /// Unbiased estimate of the radiance along `camera.ray`, its weight left out. `aovs` has as many entries as
     /// [`Integrator::aov_names`] and is zero on entry.
     fn radiance(
         &self,
         scene: &Scene,
-        ray: &Ray,
+        camera: &CameraRay,
         stream: &mut Stream<'_>,
         arena: &mut Arena,
         aovs: &mut [f32],

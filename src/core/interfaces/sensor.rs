@@ -11,6 +11,10 @@ pub struct CameraRay {
     pub ray: Ray,
     /// What the radiance along it counts for.
     pub weight: Rgb,
+    /// Rays through the film a little to the right and a little below, for those who ask
+    /// ([`wants_differentials`](super::RadianceEstimator::wants_differentials)): one pixel over the square root of
+    /// the samples per pixel away.
+    pub offsets: Option<[Ray; 2]>,
 }
 
 /// A sensor plugin. Film positions are in [0, 1)² of the *full* film, (0, 0) at the top left.

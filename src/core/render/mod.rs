@@ -17,7 +17,7 @@ pub use reference_order::ReferenceOrder;
 pub use tiles::{render_estimator, replay};
 
 use crate::interfaces::{FilmSettings, Sampler, Sensor};
-use crate::math::UVec2;
+use crate::math::{UVec2, Vec2};
 use crate::scene::{BuiltSensor, Scene};
 use std::fmt;
 
@@ -85,6 +85,16 @@ impl<'a> RenderContext<'a> {
         let seed = seed.wrapping_add(camera.sampler.seed());
         let (sensor, sampler) = (&*camera.sensor, &*camera.sampler);
         RenderContext { scene, sensor, film, sampler, budget, seed, order: SampleOrder::PerSample, control, store }
+    }
+
+    /// How far beside a camera ray its offset rays pass, in units of the film: one pixel over the square root of the
+    /// samples per pixel, as in the reference. A run by the clock counts as one sample.
+    pub(crate) fn differential_step(&self) -> Vec2 {
+        let spp = match self.budget {
+            Budget::Samples(spp) => self.sampler.round_spp(spp),
+            Budget::Seconds(_) => 1,
+        };
+        Vec2::splat((spp as f32).sqrt().recip()) / self.film.size.as_vec2()
     }
 
     /// The window that is sampled: the crop window, and a border if the film asks for one.

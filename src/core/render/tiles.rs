@@ -224,8 +224,13 @@ fn sample_pixel(
         // Nothing moves yet; the number is drawn so that the others stay the same when something will.
         stream.next_1d();
     }
-    let camera = cx.sensor.ray(film, lens);
-    let mut value = estimator.radiance(cx.scene, &camera.ray, stream, arena, aovs);
+    let mut camera = cx.sensor.ray(film, lens);
+    if estimator.wants_differentials() {
+        let step = cx.differential_step();
+        let beside = |offset: Vec2| cx.sensor.ray(film + offset, lens).ray;
+        camera.offsets = Some([beside(Vec2::new(step.x, 0.0)), beside(Vec2::new(0.0, step.y))]);
+    }
+    let mut value = estimator.radiance(cx.scene, &camera, stream, arena, aovs);
     value.rgb *= camera.weight;
     (offset, value)
 }
