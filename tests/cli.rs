@@ -300,7 +300,7 @@ fn mistakes_are_told_with_exit_code_2() {
         (&["render", "no-such-scene.xml"][..], "no-such-scene.xml"),
         (&["render", "--spp", "0"][..], "--spp"),
         (&["render", "--spp", "4", "--seconds", "1"][..], "cannot be used with"),
-        (&["render", "-s", "1"][..], "counted from 0"),
+        (&["render", "-s", "1"][..], "there is no sensor 1"),
         (&["render", "--integrator", "paht"][..], "did you mean \"path\"?"),
         (&["render", "-D", "no_such_name=1"][..], "no_such_name"),
         (&["render", "--max-memory", "0", "-D", "res=4096"][..], "--max-memory"),
