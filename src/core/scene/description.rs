@@ -72,7 +72,7 @@ impl ObjectKind {
     ];
 
     /// The XML tag.
-    pub fn tag(self) -> &'static str {
+    pub const fn tag(self) -> &'static str {
         match self {
             ObjectKind::Scene => "scene",
             ObjectKind::Integrator => "integrator",

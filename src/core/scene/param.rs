@@ -200,27 +200,7 @@ impl Param {
 
     /// Nested objects of a kind, at least `min` and at most `max`, whatever name they have.
     pub const fn child(kind: ObjectKind, min: usize, max: usize, doc: &'static str) -> Self {
-        // `tag()` is not const; the registry test checks that these names agree with it.
-        let name = match kind {
-            ObjectKind::Scene => "scene",
-            ObjectKind::Integrator => "integrator",
-            ObjectKind::Sensor => "sensor",
-            ObjectKind::Film => "film",
-            ObjectKind::Rfilter => "rfilter",
-            ObjectKind::Sampler => "sampler",
-            ObjectKind::Emitter => "emitter",
-            ObjectKind::Shape => "shape",
-            ObjectKind::Bsdf => "bsdf",
-            ObjectKind::Texture => "texture",
-            ObjectKind::Volume => "volume",
-            ObjectKind::Medium => "medium",
-            ObjectKind::Phase => "phase",
-            ObjectKind::Guide => "guide",
-            ObjectKind::LightSampler => "light_sampler",
-            ObjectKind::Roulette => "roulette",
-            ObjectKind::Cache => "cache",
-        };
-        Self::new(name, ParamType::Child(kind, min, max), Default::Unset, doc)
+        Self::new(kind.tag(), ParamType::Child(kind, min, max), Default::Unset, doc)
     }
 
     /// Makes it required.
