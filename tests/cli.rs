@@ -114,6 +114,7 @@ fn an_exr_file_tells_how_it_was_made() {
 fn other_integrators_and_samplers_can_be_chosen() {
     let path = cornell("chosen", "path.exr", &["--spp", "64"]);
     let direct = cornell("chosen", "direct.exr", &["--spp", "64", "--integrator", "direct"]);
+    assert_eq!(*attribute(&path, "lucerna:integrator"), Attribute::Text("path".to_owned()));
     assert_eq!(*attribute(&direct, "lucerna:integrator"), Attribute::Text("direct".to_owned()));
     assert!(mean(&direct.image) < 0.9 * mean(&path.image), "direct light only must be darker");
     let short = cornell("chosen", "short.exr", &["--spp", "64", "--integrator", "path:max_depth=2"]);

@@ -141,6 +141,9 @@ pub fn run(registry: &Registry, arguments: &Arguments) -> Result<ExitCode, Failu
     if let Some(size) = arguments.size {
         resize(&mut description, size);
     }
+    let is_integrator = |id| description.node(id).kind == ObjectKind::Integrator;
+    let chosen = description.children(description.root).map(|(_, child)| child).find(|child| is_integrator(*child));
+    let name = chosen.map_or_else(String::new, |child| description.node(child).plugin.clone());
     let mut scene = arguments.scene.build(registry, description)?.scene;
     if arguments.reference_order.is_some() {
         scene.use_reference_offsets();
@@ -153,7 +156,7 @@ pub fn run(registry: &Registry, arguments: &Arguments) -> Result<ExitCode, Failu
         (None, spp) => Budget::Samples(camera.sampler.round_spp(spp.unwrap_or(camera.sampler.sample_count()))),
     };
     tell_rounding(arguments, budget);
-    render(arguments, &scene, &camera, &*integrator, budget, &output)
+    render(arguments, &scene, &camera, (&name, &*integrator), budget, &output)
 }
 
 fn tell_rounding(arguments: &Arguments, budget: Budget) {
@@ -197,7 +200,7 @@ fn render(
     arguments: &Arguments,
     scene: &Scene,
     camera: &BuiltSensor,
-    integrator: &dyn Integrator,
+    (name, integrator): (&str, &dyn Integrator),
     budget: Budget,
     output: &Path,
 ) -> Result<ExitCode, Failure> {
@@ -237,7 +240,7 @@ fn render(
     }
     let report = integrator.render(&mut cx).map_err(Failure::new)?;
     bar.finish();
-    write(arguments, &cx, &report, output)?;
+    write(arguments, name, &cx, &report, output)?;
     summary(arguments, &cx, &report, output)?;
     let bad = report.bad.count > 0 && arguments.strict_nan;
     Ok(if bad { ExitCode::from(BAD_SAMPLES) } else { ExitCode::SUCCESS })
@@ -278,20 +281,26 @@ fn replay_pixel(
     Ok(ExitCode::SUCCESS)
 }
 
-fn write(arguments: &Arguments, cx: &RenderContext<'_>, report: &Report, output: &Path) -> Result<(), Failure> {
+fn write(
+    arguments: &Arguments,
+    integrator: &str,
+    cx: &RenderContext<'_>,
+    report: &Report,
+    output: &Path,
+) -> Result<(), Failure> {
     let (channels, data) = cx.store.develop(&cx.film);
     let size = cx.store.size();
     let picture = Image { width: size.x, height: size.y, channels, data };
     let extension = output.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     let written = match extension.as_deref() {
-        Some("exr") => exr::write(output, &picture, &exr_options(arguments, cx, report)),
+        Some("exr") => exr::write(output, &picture, &exr_options(arguments, integrator, cx, report)),
         Some("png") => png::write_srgb(output, &picture),
         _ => image::write(output, &picture),
     };
     written.map_err(|e| Failure::new(format!("{}: {e}", output.display())))
 }
 
-fn exr_options(arguments: &Arguments, cx: &RenderContext<'_>, report: &Report) -> exr::ExrOptions {
+fn exr_options(arguments: &Arguments, integrator: &str, cx: &RenderContext<'_>, report: &Report) -> exr::ExrOptions {
     use exr::{Attribute, HalfChannels};
     let half = match (cx.film.component_format, cx.film.file_format) {
         (ComponentFormat::Float16, FileFormat::OpenExr) => HalfChannels::All,
@@ -303,8 +312,8 @@ fn exr_options(arguments: &Arguments, cx: &RenderContext<'_>, report: &Report) -
         attributes: vec![
             ("lucerna:version".to_owned(), text(env!("CARGO_PKG_VERSION"))),
             ("lucerna:scene".to_owned(), text(&arguments.scene.name())),
-            ("lucerna:integrator".to_owned(), text(arguments.integrator.as_deref().unwrap_or("scene"))),
-            ("lucerna:seed".to_owned(), Attribute::Number(f64::from(cx.seed))),
+            ("lucerna:integrator".to_owned(), text(integrator)),
+            ("lucerna:seed".to_owned(), Attribute::Number(f64::from(arguments.seed))),
             ("lucerna:spp".to_owned(), Attribute::Number(f64::from(report.spp))),
             ("lucerna:samples".to_owned(), Attribute::Number(report.samples as f64)),
             ("lucerna:seconds".to_owned(), Attribute::Number(report.seconds)),
