@@ -18,11 +18,10 @@
 //! </integrator>
 //! ```
 
-use super::common::{COMMON, HIDE_IGNORED, timeout};
+use super::common::{COMMON, HIDE_IGNORED, Nested, forward_integrator, timeout};
 use lucerna_core::accel::Ray;
 use lucerna_core::interfaces::{Arena, CameraRay, Integrator, Radiance, RadianceEstimator, SurfaceHit};
 use lucerna_core::math::Vec2;
-use lucerna_core::render::{RenderContext, RenderError, Report, render_estimator};
 use lucerna_core::sampling::Stream;
 use lucerna_core::scene::{Built, Constructor, ObjectKind, Param, Plugin, Properties, Scene, did_you_mean};
 use std::sync::Arc;
@@ -77,19 +76,9 @@ const KINDS: &[(&str, Kind, &[&str])] = &[
 ];
 
 fn build(p: &Properties<'_>) -> Built<dyn Integrator> {
-    let mut nested = Vec::new();
-    let mut names = Vec::new();
-    for (name, integrator) in p.integrators() {
-        if integrator.estimator().is_none() {
-            return Err(p.error(name, format!("integrator \"{name}\" cannot be nested")));
-        }
-        names.extend(["R", "G", "B", "A"].map(|c| format!("{name}.{c}")));
-        let own = integrator.aov_names();
-        nested.push((integrator, own.len()));
-    }
-    for (name, integrator) in p.integrators() {
-        names.extend(integrator.aov_names().iter().map(|aov| format!("{name}.{aov}")));
-    }
+    let nested = Nested::all(p)?;
+    let images = nested.iter().flat_map(|n| ["R", "G", "B", "A"].map(|c| format!("{}.{c}", n.name)));
+    let mut names: Vec<String> = images.chain(nested.iter().flat_map(Nested::aov_names)).collect();
     let mut kinds = Vec::new();
     for item in p.string("aovs").split([',', ' ', '\t', '\n']).filter(|s| !s.is_empty()) {
         let Some((name, kind)) = item.split_once(':').filter(|(n, k)| !n.is_empty() && !k.is_empty()) else {
@@ -110,35 +99,18 @@ fn build(p: &Properties<'_>) -> Built<dyn Integrator> {
 }
 
 struct Aov {
-    /// Integrators with the number of their own extra channels.
-    nested: Vec<(Arc<dyn Integrator>, usize)>,
+    nested: Vec<Nested>,
     kinds: Vec<Kind>,
     names: Vec<String>,
     timeout: Option<f64>,
 }
 
-impl Integrator for Aov {
-    fn render(&self, cx: &mut RenderContext<'_>) -> Result<Report, RenderError> {
-        render_estimator(cx, self)
-    }
-
-    fn aov_names(&self) -> Vec<String> {
-        self.names.clone()
-    }
-
-    fn timeout(&self) -> Option<f64> {
-        self.timeout
-    }
-
-    fn estimator(&self) -> Option<&dyn RadianceEstimator> {
-        Some(self)
-    }
-}
+forward_integrator!(Aov, |this| this.names.clone());
 
 impl RadianceEstimator for Aov {
     fn wants_differentials(&self) -> bool {
         let own = self.kinds.iter().any(|kind| matches!(kind, Kind::DuvDx | Kind::DuvDy));
-        own || self.nested.iter().any(|(i, _)| i.estimator().is_some_and(RadianceEstimator::wants_differentials))
+        own || Nested::want_differentials(&self.nested)
     }
 
     fn radiance(
@@ -151,16 +123,16 @@ impl RadianceEstimator for Aov {
     ) -> Radiance {
         let mut found = Radiance::default();
         let (images, mut rest) = aovs.split_at_mut(4 * self.nested.len());
-        for (i, (integrator, own)) in self.nested.iter().enumerate() {
-            let (own, others) = rest.split_at_mut(*own);
+        for (i, inner) in self.nested.iter().enumerate() {
+            let (own, others) = rest.split_at_mut(inner.aovs.len());
             rest = others;
-            let Some(estimator) = integrator.estimator() else { continue };
-            let inner = estimator.radiance(scene, camera, stream, arena, own);
-            images[4 * i..4 * i + 3].copy_from_slice(&inner.rgb.to_array());
-            images[4 * i + 3] = inner.alpha;
-            found.rays += inner.rays;
+            let Some(estimator) = inner.estimator() else { continue };
+            let seen = estimator.radiance(scene, camera, stream, arena, own);
+            images[4 * i..4 * i + 3].copy_from_slice(&seen.rgb.to_array());
+            images[4 * i + 3] = seen.alpha;
+            found.rays += seen.rays;
             if i == 0 {
-                (found.rgb, found.alpha) = (inner.rgb, inner.alpha);
+                (found.rgb, found.alpha) = (seen.rgb, seen.alpha);
             }
         }
         found.rays += 1;

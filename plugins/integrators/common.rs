@@ -2,10 +2,11 @@
 
 use lucerna_core::accel::Ray;
 use lucerna_core::color::Rgb;
-use lucerna_core::interfaces::{EmitterFlags, LightPoint, SurfaceHit};
+use lucerna_core::interfaces::{EmitterFlags, Integrator, LightPoint, RadianceEstimator, SurfaceHit};
 use lucerna_core::math::{Vec2, Vec3};
 use lucerna_core::sampling::Stream;
-use lucerna_core::scene::{EmitterId, Param, Properties, Scene};
+use lucerna_core::scene::{EmitterId, Failed, Param, Properties, Scene};
+use std::sync::Arc;
 
 /// Parameters of every integrator.
 pub const COMMON: &[Param] = &[
@@ -146,16 +147,59 @@ pub fn first_hit_without_light(scene: &Scene, ray: &Ray, rays: &mut u32) -> Opti
     }
 }
 
+/// An integrator inside another one.
+pub struct Nested {
+    /// The name it was given.
+    pub name: String,
+    /// Its own extra channels.
+    pub aovs: Vec<String>,
+    integrator: Arc<dyn Integrator>,
+}
+
+impl Nested {
+    /// All nested integrators in file order; one that is no forward estimator is an error.
+    pub fn all(p: &Properties<'_>) -> Result<Vec<Nested>, Failed> {
+        let nest = |(name, integrator): (&str, Arc<dyn Integrator>)| match integrator.estimator() {
+            Some(_) => Ok(Nested { name: name.to_owned(), aovs: integrator.aov_names(), integrator }),
+            None => Err(p.error(name, format!("integrator \"{name}\" cannot be nested"))),
+        };
+        p.integrators().into_iter().map(nest).collect()
+    }
+
+    /// Its own extra channels as the outer integrator names them.
+    pub fn aov_names(&self) -> impl Iterator<Item = String> {
+        self.aovs.iter().map(|aov| format!("{}.{aov}", self.name))
+    }
+
+    /// The estimator; always there for what [`all`](Self::all) gave.
+    pub fn estimator(&self) -> Option<&dyn RadianceEstimator> {
+        self.integrator.estimator()
+    }
+
+    /// Whether any of them reads ray differentials.
+    pub fn want_differentials(nested: &[Nested]) -> bool {
+        nested.iter().any(|n| n.estimator().is_some_and(RadianceEstimator::wants_differentials))
+    }
+}
+
 /// Replaces the estimator-independent part of a plugin: an integrator that is a plain forward estimator, with a field
 /// `timeout`.
 macro_rules! forward_integrator {
     ($type:ty) => {
+        forward_integrator!($type, |_| Vec::new());
+    };
+    ($type:ty, $aov_names:expr) => {
         impl lucerna_core::interfaces::Integrator for $type {
             fn render(
                 &self,
                 cx: &mut lucerna_core::render::RenderContext<'_>,
             ) -> Result<lucerna_core::render::Report, lucerna_core::render::RenderError> {
                 lucerna_core::render::render_estimator(cx, self)
+            }
+
+            fn aov_names(&self) -> Vec<String> {
+                let names: fn(&$type) -> Vec<String> = $aov_names;
+                names(self)
             }
 
             fn timeout(&self) -> Option<f64> {

@@ -9,10 +9,9 @@
 //! </integrator>
 //! ```
 
-use super::common::{COMMON, HIDE_IGNORED, timeout};
+use super::common::{COMMON, HIDE_IGNORED, Nested, forward_integrator, timeout};
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{Arena, CameraRay, Integrator, Radiance, RadianceEstimator};
-use lucerna_core::render::{RenderContext, RenderError, Report, render_estimator};
 use lucerna_core::sampling::Stream;
 use lucerna_core::scene::{Built, Constructor, ObjectKind, Param, Plugin, Properties, Scene};
 use std::sync::Arc;
@@ -27,50 +26,25 @@ pub const PLUGIN: Plugin = Plugin {
 };
 
 fn build(p: &Properties<'_>) -> Built<dyn Integrator> {
-    let mut nested = Vec::new();
-    let mut names = Vec::new();
-    for (name, integrator) in p.integrators() {
-        if integrator.estimator().is_none() {
-            return Err(p.error(name, format!("integrator \"{name}\" cannot be nested")));
-        }
-        let own = integrator.aov_names();
-        names.extend(own.iter().map(|aov| format!("{name}.{aov}")));
-        names.extend(["X", "Y", "Z"].map(|c| format!("{name}.{c}")));
-        nested.push((integrator, own.len()));
-    }
+    let nested = Nested::all(p)?;
+    let colour = |n: &Nested| ["X", "Y", "Z"].map(|c| format!("{}.{c}", n.name));
+    let mut names: Vec<String> = nested.iter().flat_map(|n| n.aov_names().chain(colour(n))).collect();
     let squares: Vec<String> = names.iter().map(|n| format!("m2_{n}")).collect();
     names.extend(squares);
     Ok(Arc::new(Moment { nested, names, timeout: timeout(p) }))
 }
 
 struct Moment {
-    /// Integrators with the number of their own extra channels.
-    nested: Vec<(Arc<dyn Integrator>, usize)>,
+    nested: Vec<Nested>,
     names: Vec<String>,
     timeout: Option<f64>,
 }
 
-impl Integrator for Moment {
-    fn render(&self, cx: &mut RenderContext<'_>) -> Result<Report, RenderError> {
-        render_estimator(cx, self)
-    }
-
-    fn aov_names(&self) -> Vec<String> {
-        self.names.clone()
-    }
-
-    fn timeout(&self) -> Option<f64> {
-        self.timeout
-    }
-
-    fn estimator(&self) -> Option<&dyn RadianceEstimator> {
-        Some(self)
-    }
-}
+forward_integrator!(Moment, |this| this.names.clone());
 
 impl RadianceEstimator for Moment {
     fn wants_differentials(&self) -> bool {
-        self.nested.iter().any(|(i, _)| i.estimator().is_some_and(RadianceEstimator::wants_differentials))
+        Nested::want_differentials(&self.nested)
     }
 
     fn radiance(
@@ -85,8 +59,9 @@ impl RadianceEstimator for Moment {
         let mut first = None;
         let mut rays = 0;
         let mut at = 0;
-        for (integrator, own) in &self.nested {
-            let Some(estimator) = integrator.estimator() else { continue };
+        for inner in &self.nested {
+            let Some(estimator) = inner.estimator() else { continue };
+            let own = inner.aovs.len();
             let found = estimator.radiance(scene, camera, stream, arena, &mut values[at..at + own]);
             at += own;
             values[at..at + 3].copy_from_slice(&found.rgb.to_xyz());

@@ -87,6 +87,14 @@ impl<'a> RenderContext<'a> {
         RenderContext { scene, sensor, film, sampler, budget, seed, order: SampleOrder::PerSample, control, store }
     }
 
+    /// The reference's order of random numbers, if it is asked for.
+    pub(crate) fn reference_order(&self) -> Option<ReferenceOrder> {
+        let SampleOrder::Reference { threads } = self.order else { return None };
+        let offset = self.sampler.seed();
+        let size = self.film.crop_size + 2 * self.border();
+        Some(ReferenceOrder::new(size, self.seed.wrapping_sub(offset), offset, threads))
+    }
+
     /// How far beside a camera ray its offset rays pass, in units of the film: one pixel over the square root of the
     /// samples per pixel, as in the reference. A run by the clock counts as one sample.
     pub(crate) fn differential_step(&self) -> Vec2 {

@@ -31,7 +31,8 @@ pub fn render_estimator(cx: &mut RenderContext<'_>, estimator: &dyn RadianceEsti
         SampleOrder::PerSample => cx.sampler.point_set(cx.seed, asked, cx.film.size),
         SampleOrder::Reference { .. } => None,
     };
-    let run = Run { cx, estimator, points: points.as_deref(), taken: AtomicU64::new(0) };
+    let run =
+        Run { cx, estimator, points: points.as_deref(), reference: cx.reference_order(), taken: AtomicU64::new(0) };
     let (report, store) = run.passes(asked)?;
     cx.store = store;
     Ok(report)
@@ -53,6 +54,7 @@ struct Run<'r, 'a> {
     cx: &'r RenderContext<'a>,
     estimator: &'r dyn RadianceEstimator,
     points: Option<&'r dyn PointSet>,
+    reference: Option<ReferenceOrder>,
     taken: AtomicU64,
 }
 
@@ -140,14 +142,6 @@ impl Run<'_, '_> {
 
     fn tile(&self, tile: Window, start: u32, end: u32, complete_spp: u32) -> TileResult {
         let cx = self.cx;
-        let reference = match cx.order {
-            SampleOrder::PerSample => None,
-            SampleOrder::Reference { threads } => {
-                let offset = cx.sampler.seed();
-                let size = cx.film.crop_size + 2 * cx.border();
-                Some(ReferenceOrder::new(size, cx.seed.wrapping_sub(offset), offset, threads))
-            }
-        };
         let mut result = TileResult {
             store: TileStore::new(tile, &*cx.film.filter, cx.store.aovs().len()),
             samples: 0,
@@ -170,7 +164,7 @@ impl Run<'_, '_> {
                 let pixel = crop + inside;
                 // Border pixels may have negative coordinates; the key wraps them to large ones.
                 let key = UVec2::new(pixel.x as u32, pixel.y as u32);
-                let mut shared = reference.as_ref().map(|r| {
+                let mut shared = self.reference.as_ref().map(|r| {
                     let sampled = (inside + IVec2::splat(cx.border() as i32)).as_uvec2();
                     Stream::independent(r.generator(sampled))
                 });
