@@ -9,6 +9,7 @@ mod multijitter;
 mod orthogonal;
 mod permutation;
 mod sobol;
+mod strata;
 mod stratified;
 
 use lucerna_core::interfaces::mix;

@@ -14,7 +14,8 @@
 //! ```
 
 use super::permutation::permute;
-use super::{COMMON, Common, Counted, JITTER, dimension_key, in_stratum, jitters, pixel_key};
+use super::strata::Strata;
+use super::{COMMON, Common, JITTER, in_stratum};
 use lucerna_core::interfaces::{Sampler, mix};
 use lucerna_core::math::{UVec2, Vec2};
 use lucerna_core::sampling::PointSet;
@@ -61,51 +62,33 @@ impl Sampler for MultiJitter {
 
     fn point_set(&self, seed: u32, spp: u32, _film_size: UVec2) -> Option<Box<dyn PointSet>> {
         let grid = grid(spp);
-        Some(Box::new(Points { seed, grid, count: grid.element_product(), jitter: self.jitter }))
+        Some(Box::new(Points { strata: Strata { seed, count: grid.element_product(), jitter: self.jitter }, grid }))
     }
 }
 
 struct Points {
-    seed: u32,
+    strata: Strata,
     grid: UVec2,
-    count: u32,
-    jitter: bool,
-}
-
-impl Points {
-    fn offset(&self, key: u64, sample: u32) -> Vec2 {
-        if self.jitter { jitters(key, sample).into() } else { Vec2::splat(0.5) }
-    }
 }
 
 impl PointSet for Points {
     fn singles(&self, pixel: UVec2, sample: u32, first: u32, out: &mut [f32]) {
-        let pixel = pixel_key(self.seed, pixel, sample / self.count);
-        let sample = sample % self.count;
-        for (dimension, out) in (first..).zip(out) {
-            let key = dimension_key(pixel, Counted::Singles, dimension);
-            let stratum = permute(sample, self.count, key as u32);
-            *out = in_stratum(stratum, self.offset(key, sample).x, self.count);
-        }
+        self.strata.singles(pixel, sample, first, out);
     }
 
     fn pairs(&self, pixel: UVec2, sample: u32, first: u32, out: &mut [Vec2]) {
-        let pixel = pixel_key(self.seed, pixel, sample / self.count);
-        let sample = sample % self.count;
         let UVec2 { x: columns, y: rows } = self.grid;
-        for (dimension, out) in (first..).zip(out) {
-            let key = dimension_key(pixel, Counted::Pairs, dimension);
-            let cell = permute(sample, self.count, key as u32);
+        let count = self.strata.count;
+        self.strata.pairs((pixel, sample), first, out, |key, cell, offset| {
             let (column, row) = (cell % columns, cell / columns);
             // Within its cell a point lies in the fine column that belongs to its row, and the other way round.
             let inner = mix(key);
             let fine_column = permute(row, rows, inner as u32);
             let fine_row = permute(column, columns, (inner >> 32) as u32);
-            let offset = self.offset(key, sample);
-            *out = Vec2::new(
-                in_stratum(column * rows + fine_column, offset.x, self.count),
-                in_stratum(row * columns + fine_row, offset.y, self.count),
-            );
-        }
+            Vec2::new(
+                in_stratum(column * rows + fine_column, offset.x, count),
+                in_stratum(row * columns + fine_row, offset.y, count),
+            )
+        });
     }
 }

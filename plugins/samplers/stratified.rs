@@ -12,8 +12,8 @@
 //! </sampler>
 //! ```
 
-use super::permutation::permute;
-use super::{COMMON, Common, Counted, JITTER, dimension_key, in_stratum, jitters, pixel_key};
+use super::strata::Strata;
+use super::{COMMON, Common, JITTER, in_stratum};
 use lucerna_core::interfaces::Sampler;
 use lucerna_core::math::{UVec2, Vec2};
 use lucerna_core::sampling::PointSet;
@@ -59,45 +59,27 @@ impl Sampler for Stratified {
 
     fn point_set(&self, seed: u32, spp: u32, _film_size: UVec2) -> Option<Box<dyn PointSet>> {
         let count = next_square(spp);
-        Some(Box::new(Points { seed, count, side: f64::from(count).sqrt() as u32, jitter: self.jitter }))
+        Some(Box::new(Points {
+            strata: Strata { seed, count, jitter: self.jitter },
+            side: f64::from(count).sqrt() as u32,
+        }))
     }
 }
 
 struct Points {
-    seed: u32,
-    count: u32,
+    strata: Strata,
     side: u32,
-    jitter: bool,
-}
-
-impl Points {
-    fn offset(&self, key: u64, sample: u32) -> Vec2 {
-        if self.jitter { jitters(key, sample).into() } else { Vec2::splat(0.5) }
-    }
 }
 
 impl PointSet for Points {
     fn singles(&self, pixel: UVec2, sample: u32, first: u32, out: &mut [f32]) {
-        let pixel = pixel_key(self.seed, pixel, sample / self.count);
-        let sample = sample % self.count;
-        for (dimension, out) in (first..).zip(out) {
-            let key = dimension_key(pixel, Counted::Singles, dimension);
-            let stratum = permute(sample, self.count, key as u32);
-            *out = in_stratum(stratum, self.offset(key, sample).x, self.count);
-        }
+        self.strata.singles(pixel, sample, first, out);
     }
 
     fn pairs(&self, pixel: UVec2, sample: u32, first: u32, out: &mut [Vec2]) {
-        let pixel = pixel_key(self.seed, pixel, sample / self.count);
-        let sample = sample % self.count;
-        for (dimension, out) in (first..).zip(out) {
-            let key = dimension_key(pixel, Counted::Pairs, dimension);
-            let cell = permute(sample, self.count, key as u32);
-            let offset = self.offset(key, sample);
-            *out = Vec2::new(
-                in_stratum(cell % self.side, offset.x, self.side),
-                in_stratum(cell / self.side, offset.y, self.side),
-            );
-        }
+        let side = self.side;
+        self.strata.pairs((pixel, sample), first, out, |_, cell, offset| {
+            Vec2::new(in_stratum(cell % side, offset.x, side), in_stratum(cell / side, offset.y, side))
+        });
     }
 }
