@@ -139,7 +139,8 @@ impl Textured {
             let (uv, pdf_uv) = self.radiance.sample_position(u2)?;
             let hit = self.shape.at_uv(uv)?;
             let pdf = per_area(pdf_uv, &hit);
-            Some((AreaSample { p: hit.p, p_error: hit.p_error, n: hit.n, uv: hit.uv, pdf }, hit))
+            let SurfaceHit { p, p_error, n, uv, triangle, .. } = hit;
+            Some((AreaSample { p, p_error, n, uv, pdf, triangle }, hit))
         } else {
             let sample = self.shape.sample_area(u2)?;
             let frame = Frame::from_normal(sample.n);
@@ -196,7 +197,7 @@ impl Emitter for Textured {
 mod tests {
     use super::super::testing;
     use super::*;
-    use lucerna_core::accel::{Geometry, Hit, Ray};
+    use lucerna_core::accel::{Geometry, Hit, NO_TRIANGLE, Ray};
     use lucerna_core::image;
     use lucerna_core::math::{Aabb, DMat4};
 
@@ -228,12 +229,19 @@ mod tests {
             3.0
         }
 
-        fn surface(&self, _ray: &Ray, _hit: &Hit) -> SurfaceHit {
+        fn surface(&self, _ray: &Ray, _hit: &Hit, _into: &mut SurfaceHit) {
             unreachable!("lights do not trace rays")
         }
 
         fn sample_area(&self, u2: Vec2) -> Option<AreaSample> {
-            Some(AreaSample { p: Self::point(u2), p_error: Vec3::ZERO, n: -Vec3::Z, uv: u2, pdf: 1.0 / 3.0 })
+            Some(AreaSample {
+                p: Self::point(u2),
+                p_error: Vec3::ZERO,
+                n: -Vec3::Z,
+                uv: u2,
+                pdf: 1.0 / 3.0,
+                triangle: NO_TRIANGLE,
+            })
         }
 
         fn at_uv(&self, uv: Vec2) -> Option<SurfaceHit> {

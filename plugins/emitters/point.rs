@@ -15,6 +15,7 @@
 //! ```
 
 use super::COMMON;
+use lucerna_core::accel::NO_TRIANGLE;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{Emitter, EmitterFlags, LightPoint, LightSample};
 use lucerna_core::math::{Vec2, Vec3};
@@ -51,7 +52,8 @@ pub(super) fn towards(from: Vec3, position: Vec3) -> Option<(LightPoint, f32)> {
     let distance = d.length();
     let inverse = 1.0 / distance;
     let falloff = inverse * inverse;
-    let point = LightPoint { p: position, n: Vec3::ZERO, uv: Vec2::ZERO, d: d * inverse, distance };
+    let point =
+        LightPoint { p: position, n: Vec3::ZERO, uv: Vec2::ZERO, d: d * inverse, distance, triangle: NO_TRIANGLE };
     falloff.is_finite().then_some((point, falloff))
 }
 

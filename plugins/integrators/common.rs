@@ -133,17 +133,20 @@ pub fn weighted_emission(
     }
 }
 
-/// The first hit that gives off no light: what the camera sees where lights are hidden.
-pub fn first_hit_without_light(scene: &Scene, ray: &Ray, rays: &mut u32) -> Option<SurfaceHit> {
+/// The first hit that gives off no light, written in place: what the camera sees where lights are hidden. Whether there
+/// is any.
+pub fn find_surface_without_light(scene: &Scene, ray: &Ray, hit: &mut SurfaceHit, rays: &mut u32) -> bool {
     let mut ray = *ray;
     loop {
         *rays += 1;
-        let hit = scene.intersect_surface(&ray)?;
-        let shines = scene.emitter_at(&hit).is_some_and(|id| scene.emitter(id).flags().has(EmitterFlags::SURFACE));
-        if !shines {
-            return Some(hit);
+        if !scene.find_surface(&ray, hit) {
+            return false;
         }
-        ray = Ray { o: hit.origin_towards(ray.d), d: ray.d, t_min: 0.0, t_max: ray.t_max - hit.t };
+        let shines = scene.emitter_at(hit).is_some_and(|id| scene.emitter(id).flags().has(EmitterFlags::SURFACE));
+        if !shines {
+            return true;
+        }
+        ray = Ray { t_max: ray.t_max - hit.t, ..hit.leave(ray.d) };
     }
 }
 

@@ -18,12 +18,11 @@
 //! ```
 
 use super::common::{
-    COMMON, HIDE, emission, first_hit_without_light, forward_integrator, mis_weight, pair_before_single, timeout,
+    COMMON, HIDE, emission, find_surface_without_light, forward_integrator, mis_weight, pair_before_single, timeout,
 };
-use lucerna_core::accel::Ray;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{
-    Arena, CameraRay, Integrator, LightPoint, Lobes, Radiance, RadianceEstimator, Transport,
+    Arena, CameraRay, Integrator, LightPoint, Lobes, Radiance, RadianceEstimator, SurfaceHit, Transport,
 };
 use lucerna_core::sampling::Stream;
 use lucerna_core::scene::{Built, Constructor, Param, Plugin, Properties, Scene};
@@ -81,19 +80,22 @@ impl RadianceEstimator for Direct {
     ) -> Radiance {
         let ray = &camera.ray;
         let mut found = Radiance::default();
-        let hit = if self.hide_emitters {
-            first_hit_without_light(scene, ray, &mut found.rays)
+        let mut hit = SurfaceHit::default();
+        let met = if self.hide_emitters {
+            find_surface_without_light(scene, ray, &mut hit, &mut found.rays)
         } else {
             found.rays += 1;
-            scene.intersect_surface(ray)
+            scene.find_surface(ray, &mut hit)
         };
         if !self.hide_emitters
-            && let Some((_, radiance)) = emission(scene, ray, hit.as_ref())
+            && let Some((_, radiance)) = emission(scene, ray, met.then_some(&hit))
         {
             found.rgb += radiance;
         }
-        found.alpha = f32::from(hit.is_some() || (!self.hide_emitters && scene.environment().is_some()));
-        let Some(hit) = hit else { return found };
+        found.alpha = f32::from(met || (!self.hide_emitters && scene.environment().is_some()));
+        if !met {
+            return found;
+        }
         let (emitter_count, bsdf_count) = (self.emitter_samples as f32, self.bsdf_samples as f32);
         let bsdf = scene.bsdf(&hit);
         let bxdf = bsdf.resolve(&hit, arena);
@@ -119,7 +121,7 @@ impl RadianceEstimator for Direct {
             let (u1, u2) = pair_before_single(stream);
             let Some(sample) = bxdf.sample(hit.wi, u1, u2, Transport::Radiance) else { continue };
             let d = hit.to_world(sample.wo);
-            let next = Ray::new(hit.origin_towards(d), d);
+            let next = hit.leave(d);
             found.rays += 1;
             let light_hit = scene.intersect_surface(&next);
             let Some((id, radiance)) = emission(scene, &next, light_hit.as_ref()) else { continue };

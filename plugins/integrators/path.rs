@@ -18,10 +18,9 @@
 //! ```
 
 use super::common::{
-    COMMON, PATH, PathLimits, Scattered, first_hit_without_light, forward_integrator, mis_weight, survival, timeout,
+    COMMON, PATH, PathLimits, Scattered, find_surface_without_light, forward_integrator, mis_weight, survival, timeout,
     weighted_emission,
 };
-use lucerna_core::accel::Ray;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{
     Arena, Bxdf, CameraRay, Integrator, LightSample, Lobes, Radiance, RadianceEstimator, SurfaceHit, Transport,
@@ -72,18 +71,21 @@ impl RadianceEstimator for Path {
         // Of the vertex before; none at the camera and after a delta lobe, where light sampling has no part.
         let mut last: Option<Scattered> = None;
         let mut depth = 0;
+        let mut hit = SurfaceHit::default();
         loop {
             let hidden = hide_emitters && depth == 0;
-            let hit = if hidden {
-                first_hit_without_light(scene, &ray, &mut found.rays)
+            let met = if hidden {
+                find_surface_without_light(scene, &ray, &mut hit, &mut found.rays)
             } else {
                 found.rays += 1;
-                scene.intersect_surface(&ray)
+                scene.find_surface(&ray, &mut hit)
             };
             if !hidden {
-                found.rgb += throughput * weighted_emission(scene, &ray, hit.as_ref(), last, mis_weight);
+                found.rgb += throughput * weighted_emission(scene, &ray, met.then_some(&hit), last, mis_weight);
             }
-            let Some(hit) = hit else { break };
+            if !met {
+                break;
+            }
             if depth + 1 >= max_depth {
                 if depth == 0 && !found.rgb.is_black() {
                     found.alpha = 1.0;
@@ -111,7 +113,7 @@ impl RadianceEstimator for Path {
                 found.alpha = 1.0;
             }
             let d = hit.to_world(sample.wo);
-            ray = Ray::new(hit.origin_towards(d), d);
+            ray = hit.leave(d);
             last = (!sample.lobe.has_delta()).then_some(Scattered { p: hit.p, pdf: sample.pdf });
             depth += 1;
 

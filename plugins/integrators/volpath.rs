@@ -18,7 +18,7 @@
 //! ```
 
 use super::common::{
-    COMMON, PATH, PathLimits, Scattered, balance_weight, first_hit_without_light, forward_integrator, mis_weight,
+    COMMON, PATH, PathLimits, Scattered, balance_weight, find_surface_without_light, forward_integrator, mis_weight,
     pair_before_single, survival, timeout, weighted_emission,
 };
 use lucerna_core::accel::Ray;
@@ -102,6 +102,7 @@ impl RadianceEstimator for VolPath {
         let mut last: Option<Scattered> = None;
         // The reference picks the colour channel that media are sampled by.
         stream.next_1d();
+        let mut hit = SurfaceHit::default();
         loop {
             if throughput.is_black() && self.variant == Variant::Plain {
                 break;
@@ -118,17 +119,19 @@ impl RadianceEstimator for VolPath {
                 throughput *= 1.0 / q;
             }
             let hidden = hide_emitters && depth == 0;
-            let hit = if hidden {
-                first_hit_without_light(scene, &ray, &mut found.rays)
+            let met = if hidden {
+                find_surface_without_light(scene, &ray, &mut hit, &mut found.rays)
             } else {
                 found.rays += 1;
-                scene.intersect_surface(&ray)
+                scene.find_surface(&ray, &mut hit)
             };
             if !hidden {
-                found.rgb +=
-                    throughput * weighted_emission(scene, &ray, hit.as_ref(), last, |a, b| self.variant.weight(a, b));
+                found.rgb += throughput
+                    * weighted_emission(scene, &ray, met.then_some(&hit), last, |a, b| self.variant.weight(a, b));
             }
-            let Some(hit) = hit else { break };
+            if !met {
+                break;
+            }
             let bsdf = scene.bsdf(&hit);
             let bxdf = bsdf.resolve(&hit, arena);
             if depth + 1 < max_depth
@@ -151,7 +154,7 @@ impl RadianceEstimator for VolPath {
             throughput *= sample.weight;
             eta *= sample.eta;
             let d = hit.to_world(sample.wo);
-            ray = Ray::new(hit.origin_towards(d), d);
+            ray = hit.leave(d);
             if sample.lobe == Lobes::NULL {
                 passed += 1;
                 if passed > MOST_PASSED {
@@ -180,7 +183,7 @@ fn transmittance(scene: &Scene, hit: &SurfaceHit, light: &LightSample, rays: &mu
         }
         let o = between.origin_towards(ray.d);
         let d = if ray.t_max.is_finite() { ray.at(ray.t_max) - o } else { ray.d };
-        ray = Ray { o, d, t_min: 0.0, t_max: ray.t_max };
+        ray = Ray { o, d, ends: [between.triangle, ray.ends[1]], ..ray };
     }
     Rgb::BLACK
 }

@@ -84,7 +84,7 @@ impl Camera {
         let (near, far) = (self.near / d.z, self.far / d.z);
         let d_world = self.to_world.vector(d).normalize();
         let o = self.to_world.point(o + d * near);
-        CameraRay { ray: Ray { o, d: d_world, t_min: 0.0, t_max: far - near }, weight: Rgb::WHITE, offsets: None }
+        CameraRay { ray: Ray { t_max: far - near, ..Ray::new(o, d_world) }, weight: Rgb::WHITE, offsets: None }
     }
 }
 

@@ -49,6 +49,6 @@ impl Sensor for Orthographic {
         let at = (Vec2::ONE - 2.0 * film) * Vec2::new(1.0, 1.0 / camera.aspect);
         let o = camera.to_world.point(at.extend(camera.near));
         let d = camera.to_world.vector(Vec3::Z).normalize();
-        CameraRay { ray: Ray { o, d, t_min: 0.0, t_max: camera.far - camera.near }, weight: Rgb::WHITE, offsets: None }
+        CameraRay { ray: Ray { t_max: camera.far - camera.near, ..Ray::new(o, d) }, weight: Rgb::WHITE, offsets: None }
     }
 }

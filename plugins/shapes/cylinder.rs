@@ -19,7 +19,7 @@
 //! ```
 
 use super::{COMMON, ORIENTED, enclose, nearest_root, taken_root};
-use lucerna_core::accel::{Geometry, Hit, PrimHit, Primitive, Ray};
+use lucerna_core::accel::{Geometry, Hit, NO_TRIANGLE, PrimHit, Primitive, Ray};
 use lucerna_core::interfaces::{AreaSample, Shape, SurfaceHit};
 use lucerna_core::math::error_bounds::gamma;
 use lucerna_core::math::{Aabb, DMat4, DVec3, Frame, Vec2, Vec3, coordinate_system};
@@ -170,12 +170,12 @@ impl Shape for Cylinder {
         TAU * self.tube.radius * self.tube.length
     }
 
-    fn surface(&self, ray: &Ray, hit: &Hit) -> SurfaceHit {
+    fn surface(&self, ray: &Ray, hit: &Hit, into: &mut SurfaceHit) {
         let local @ (o, d) = self.tube.local_ray(ray);
         let t = taken_root(hit, Tube::roots(local));
         let p = o + d * t;
         let on_circle = p.truncate().normalize_or(glam::DVec2::X);
-        self.hit_at(hit.t, on_circle.extend(p.z.clamp(0.0, 1.0)))
+        *into = self.hit_at(hit.t, on_circle.extend(p.z.clamp(0.0, 1.0)));
     }
 
     fn sample_area(&self, u2: Vec2) -> Option<AreaSample> {
@@ -183,7 +183,14 @@ impl Shape for Cylinder {
         let local = DVec3::new(cos, sin, f64::from(u2.x));
         let p = self.tube.to_world.transform_point3(local).as_vec3();
         let uv = Vec2::new(u2.y, u2.x);
-        Some(AreaSample { p, p_error: self.tube.error(p), n: self.normal(local), uv, pdf: 1.0 / self.area() })
+        Some(AreaSample {
+            p,
+            p_error: self.tube.error(p),
+            n: self.normal(local),
+            uv,
+            pdf: 1.0 / self.area(),
+            triangle: NO_TRIANGLE,
+        })
     }
 
     fn at_uv(&self, uv: Vec2) -> Option<SurfaceHit> {

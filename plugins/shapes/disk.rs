@@ -16,7 +16,7 @@
 
 use super::plane::Plane;
 use super::{COMMON, ORIENTED, enclose};
-use lucerna_core::accel::{Geometry, Hit, PrimHit, Primitive, Ray};
+use lucerna_core::accel::{Geometry, Hit, NO_TRIANGLE, PrimHit, Primitive, Ray};
 use lucerna_core::interfaces::{AreaSample, Shape, SurfaceHit};
 use lucerna_core::math::{Aabb, Frame, Vec2};
 use lucerna_core::sampling::warp;
@@ -95,14 +95,21 @@ impl Shape for Disk {
         PI * self.0.area
     }
 
-    fn surface(&self, _ray: &Ray, hit: &Hit) -> SurfaceHit {
-        self.hit_at(hit.t, Vec2::new(hit.u, hit.v))
+    fn surface(&self, _ray: &Ray, hit: &Hit, into: &mut SurfaceHit) {
+        *into = self.hit_at(hit.t, Vec2::new(hit.u, hit.v));
     }
 
     fn sample_area(&self, u2: Vec2) -> Option<AreaSample> {
         let local = warp::square_to_disk_concentric(u2);
         let p = self.0.point(local);
-        Some(AreaSample { p, p_error: self.0.error, n: self.0.n, uv: Self::uv(local), pdf: 1.0 / self.area() })
+        Some(AreaSample {
+            p,
+            p_error: self.0.error,
+            n: self.0.n,
+            uv: Self::uv(local),
+            pdf: 1.0 / self.area(),
+            triangle: NO_TRIANGLE,
+        })
     }
 
     fn at_uv(&self, uv: Vec2) -> Option<SurfaceHit> {

@@ -14,7 +14,7 @@
 //! </shape>
 //! ```
 
-use lucerna_core::accel::{Geometry, Hit, PrimHit, Primitive, Ray};
+use lucerna_core::accel::{Geometry, Hit, NO_TRIANGLE, PrimHit, Primitive, Ray};
 use lucerna_core::interfaces::{AreaSample, Shape, SurfaceHit};
 use lucerna_core::math::{Aabb, DVec3, Transform, Vec2};
 use lucerna_core::scene::{Built, Constructor, ObjectKind, Param, Plugin, Properties, ShapeGroup};
@@ -59,7 +59,7 @@ impl Placement {
         let to_group = self.to_world.matrix.as_dmat4().inverse();
         let o = to_group.transform_point3(ray.o.as_dvec3()).as_vec3();
         let d = to_group.transform_vector3(ray.d.as_dvec3()).as_vec3();
-        Ray { o, d, ..*ray }
+        Ray { o, d, ends: [NO_TRIANGLE; 2], ..*ray }
     }
 }
 
@@ -106,8 +106,8 @@ impl Shape for Instance {
     }
 
     /// Never asked: the scene looks into the group.
-    fn surface(&self, _ray: &Ray, _hit: &Hit) -> SurfaceHit {
-        SurfaceHit::default()
+    fn surface(&self, _ray: &Ray, _hit: &Hit, into: &mut SurfaceHit) {
+        *into = SurfaceHit::default();
     }
 
     fn sample_area(&self, _u2: Vec2) -> Option<AreaSample> {

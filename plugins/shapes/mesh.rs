@@ -42,7 +42,15 @@ impl Corner {
     }
 
     /// Unit normal by winding; zero for a triangle without area.
+    #[inline]
     fn normal(&self) -> Vec3 {
+        let [e1, e2] = [self.p[1] - self.p[0], self.p[2] - self.p[0]];
+        let n = e1.cross(e2);
+        let (squared, largest) = (n.length_squared(), e1.length_squared() * e2.length_squared());
+        // Single precision will do unless the triangle is a sliver, or leaves the range of numbers.
+        if squared > 1e-3 * largest && squared > 1e-25 && largest < 1e30 {
+            return n / squared.sqrt();
+        }
         area_normal(self.p).normalize_or_zero().as_vec3()
     }
 }
@@ -128,6 +136,7 @@ impl Mesh {
         (n0 * corner.b[0] + n1 * corner.b[1] + n2 * corner.b[2]).try_normalize().unwrap_or(n)
     }
 
+    #[inline(always)]
     fn hit_on(&self, t: f32, triangle: u32, barycentric: Vec2) -> SurfaceHit {
         let corner = self.corner(triangle, barycentric);
         let (p, p_error) = corner.point();
@@ -185,8 +194,8 @@ impl Shape for Mesh {
         self.area
     }
 
-    fn surface(&self, _ray: &Ray, hit: &Hit) -> SurfaceHit {
-        self.hit_on(hit.t, hit.prim, Vec2::new(hit.u, hit.v))
+    fn surface(&self, _ray: &Ray, hit: &Hit, into: &mut SurfaceHit) {
+        *into = self.hit_on(hit.t, hit.prim, Vec2::new(hit.u, hit.v));
     }
 
     /// With the geometric normal, which the density per solid angle needs; the reference takes the interpolated one.
@@ -195,13 +204,13 @@ impl Shape for Mesh {
         let corner = self.corner(triangle, warp::square_to_triangle(Vec2::new(u2.x, rest)));
         let (p, p_error) = corner.point();
         let n = if self.flip_normals { -corner.normal() } else { corner.normal() };
-        Some(AreaSample { p, p_error, n, uv: self.uv(&corner), pdf: 1.0 / self.area })
+        Some(AreaSample { p, p_error, n, uv: self.uv(&corner), pdf: 1.0 / self.area, triangle })
     }
 
     fn at_uv(&self, uv: Vec2) -> Option<SurfaceHit> {
-        let ray = Ray { o: uv.extend(-1.0), d: Vec3::Z, t_min: 0.0, t_max: f32::INFINITY };
+        let ray = Ray::new(uv.extend(-1.0), Vec3::Z);
         let hit = self.chart()?.intersect(&ray)?;
-        Some(self.hit_on(0.0, hit.prim, Vec2::new(hit.u, hit.v)))
+        Some(SurfaceHit { triangle: hit.prim, ..self.hit_on(0.0, hit.prim, Vec2::new(hit.u, hit.v)) })
     }
 
     fn attribute(&self, name: &str, hit: &SurfaceHit) -> Option<[f32; 3]> {

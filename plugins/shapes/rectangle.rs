@@ -76,21 +76,22 @@ impl Shape for Rectangle {
         self.area
     }
 
-    fn surface(&self, _ray: &Ray, hit: &Hit) -> SurfaceHit {
+    fn surface(&self, _ray: &Ray, hit: &Hit, into: &mut SurfaceHit) {
         let barycentric = Vec2::new(hit.u, hit.v);
         let uv = if hit.prim == 0 { barycentric } else { Vec2::ONE - barycentric };
-        let mut surface = self.hit_at(hit.t, uv.max(Vec2::ZERO));
-        surface.prim = hit.prim;
-        surface.barycentric = barycentric;
-        surface
+        *into = self.hit_at(hit.t, uv.max(Vec2::ZERO));
+        into.prim = hit.prim;
+        into.barycentric = barycentric;
     }
 
     fn sample_area(&self, u2: Vec2) -> Option<AreaSample> {
         let p = self.plane.point(2.0 * u2 - Vec2::ONE);
-        Some(AreaSample { p, p_error: self.plane.error, n: self.plane.n, uv: u2, pdf: 1.0 / self.area })
+        let triangle = u32::from(u2.x + u2.y > 1.0);
+        Some(AreaSample { p, p_error: self.plane.error, n: self.plane.n, uv: u2, pdf: 1.0 / self.area, triangle })
     }
 
     fn at_uv(&self, uv: Vec2) -> Option<SurfaceHit> {
-        (uv.cmpge(Vec2::ZERO).all() && uv.cmple(Vec2::ONE).all()).then(|| self.hit_at(0.0, uv))
+        let within = uv.cmpge(Vec2::ZERO).all() && uv.cmple(Vec2::ONE).all();
+        within.then(|| SurfaceHit { triangle: u32::from(uv.x + uv.y > 1.0), ..self.hit_at(0.0, uv) })
     }
 }

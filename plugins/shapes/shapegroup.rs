@@ -68,8 +68,8 @@ impl Shape for Group {
         0.0
     }
 
-    fn surface(&self, _ray: &Ray, _hit: &Hit) -> SurfaceHit {
-        SurfaceHit::default()
+    fn surface(&self, _ray: &Ray, _hit: &Hit, into: &mut SurfaceHit) {
+        *into = SurfaceHit::default();
     }
 
     fn sample_area(&self, _u2: Vec2) -> Option<AreaSample> {

@@ -20,7 +20,7 @@
 //! ```
 
 use super::{COMMON, ORIENTED, enclose, nearest_root, taken_root};
-use lucerna_core::accel::{Geometry, Hit, PrimHit, Primitive, Ray};
+use lucerna_core::accel::{Geometry, Hit, NO_TRIANGLE, PrimHit, Primitive, Ray};
 use lucerna_core::interfaces::{AreaSample, LightPoint, Shape, SurfaceHit};
 use lucerna_core::math::error_bounds::gamma;
 use lucerna_core::math::{Aabb, DMat4, DVec3, Frame, Vec2, Vec3, coordinate_system};
@@ -188,7 +188,14 @@ impl Sphere {
     fn sample_at(&self, outwards: Vec3) -> AreaSample {
         let p = self.ball.center + outwards * self.ball.radius;
         let uv = Self::uv(self.to_local(outwards));
-        AreaSample { p, p_error: self.ball.error(p), n: self.orient(outwards), uv, pdf: 1.0 / self.area() }
+        AreaSample {
+            p,
+            p_error: self.ball.error(p),
+            n: self.orient(outwards),
+            uv,
+            pdf: 1.0 / self.area(),
+            triangle: NO_TRIANGLE,
+        }
     }
 
     /// How the sphere is seen from outside; `None` from inside. The side the surface lies on is the one it shines to.
@@ -218,13 +225,13 @@ impl Shape for Sphere {
         self.area()
     }
 
-    fn surface(&self, ray: &Ray, hit: &Hit) -> SurfaceHit {
+    fn surface(&self, ray: &Ray, hit: &Hit, into: &mut SurfaceHit) {
         let Ball { center, radius } = *self.ball;
         // Found once more in double precision: from far away, `t` in single precision is off by more than the radius.
         let t = taken_root(hit, self.ball.roots(ray));
         let center = center.as_dvec3();
         let outwards = (ray.o.as_dvec3() - center + ray.d.as_dvec3() * t).normalize_or(DVec3::Z);
-        self.hit_at(hit.t, (center + outwards * f64::from(radius)).as_vec3(), outwards.as_vec3())
+        *into = self.hit_at(hit.t, (center + outwards * f64::from(radius)).as_vec3(), outwards.as_vec3());
     }
 
     fn sample_area(&self, u2: Vec2) -> Option<AreaSample> {
@@ -261,6 +268,7 @@ impl Shape for Sphere {
             uv: Self::uv(self.to_local(outwards)),
             d: d.normalize().as_vec3(),
             distance: distance as f32,
+            triangle: NO_TRIANGLE,
         };
         Some((point, self.ball.error(p), view.pdf()))
     }

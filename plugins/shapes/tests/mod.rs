@@ -40,7 +40,10 @@ impl Traced {
 
     fn hit(&self, o: Vec3, d: Vec3) -> Option<SurfaceHit> {
         let ray = Ray::new(o, d);
-        self.accel.intersect(&ray).map(|hit| self.shape.surface(&ray, &hit))
+        let hit = self.accel.intersect(&ray)?;
+        let mut surface = SurfaceHit::default();
+        self.shape.surface(&ray, &hit, &mut surface);
+        Some(surface)
     }
 }
 

@@ -126,9 +126,7 @@ struct Footprint {
 
 impl Bitmap {
     fn new(texels: Texels, filter: Filter, wrap: Wrap, to_uv: UvTransform) -> Self {
-        let count = f64::from(texels.size.x) * f64::from(texels.size.y);
-        let mean = (texels.scalars().map(f64::from).sum::<f64>() / count) as f32;
-        let range = texels.range();
+        let (mean, range) = (texels.mean(), texels.range());
         Bitmap { texels, filter, wrap, to_uv, mean, range, distribution: OnceLock::new() }
     }
 

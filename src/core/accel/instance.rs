@@ -1,6 +1,6 @@
 //! One group of shapes, placed many times.
 
-use super::{Accel, PrimHit, Primitive, Ray};
+use super::{Accel, NO_TRIANGLE, PrimHit, Primitive, Ray};
 use crate::math::Aabb;
 use glam::{Affine3A, DAffine3, DVec3};
 use std::sync::Arc;
@@ -42,7 +42,7 @@ impl Instance {
     fn local(&self, ray: &Ray) -> Ray {
         let o = self.to_group.transform_point3(ray.o.as_dvec3()).as_vec3();
         let d = self.to_group.transform_vector3(ray.d.as_dvec3()).as_vec3();
-        Ray { o, d, ..*ray }
+        Ray { o, d, ends: [NO_TRIANGLE; 2], ..*ray }
     }
 }
 

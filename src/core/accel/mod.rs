@@ -15,6 +15,7 @@
 pub mod builders;
 mod collapse;
 mod instance;
+mod numbering;
 mod primitive;
 mod ray;
 #[allow(unsafe_code)]
@@ -25,11 +26,12 @@ mod wide;
 
 pub use instance::Instance;
 pub use primitive::{PrimHit, Primitive};
-pub use ray::{Hit, NO_INSTANCE, Ray};
+pub use ray::{Hit, NO_INSTANCE, NO_TRIANGLE, Ray};
 
 use crate::math::Aabb;
 use builders::Builder;
 use glam::Vec3;
+use numbering::Numbering;
 use rayon::prelude::*;
 use std::sync::Arc;
 use traverse::{Found, Path, Tree};
@@ -87,8 +89,7 @@ pub struct Stats {
 pub struct Accel {
     tree: Tree,
     path: Path,
-    /// For each item, its shape and the number of its first primitive; ascending in both.
-    items: Vec<(u32, u32)>,
+    numbering: Numbering,
     degenerate: usize,
     has_instances: bool,
 }
@@ -175,18 +176,16 @@ impl Accel {
             tree.packs = wide.packs.par_iter().map(fill).collect();
         }
         let path = if options.portable { Path::PORTABLE } else { Path::fastest() };
-        Ok(Self { tree, path, items: found, degenerate, has_instances })
+        Ok(Self { tree, path, numbering: Numbering::new(found, first as u32), degenerate, has_instances })
     }
 
     /// The nearest hit with `t_min < t < t_max`.
     #[must_use]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        if !ray.is_traceable() {
-            return None;
-        }
-        let Some((scaled, scale)) = rescaled(ray) else {
+        if is_ordinary(ray) {
             return traverse::closest(&self.tree, self.path, ray).map(|found| self.hit(found));
-        };
+        }
+        let (scaled, scale) = rescaled(ray)?;
         let mut hit = traverse::closest(&self.tree, self.path, &scaled).map(|found| self.hit(found))?;
         hit.t = (f64::from(hit.t) / scale) as f32;
         (ray.t_min.max(0.0) < hit.t && hit.t < ray.t_max).then_some(hit)
@@ -195,11 +194,10 @@ impl Accel {
     /// Whether anything is hit with `t_min < t < t_max`. Quicker than [`Accel::intersect`].
     #[must_use]
     pub fn occluded(&self, ray: &Ray) -> bool {
-        ray.is_traceable()
-            && match rescaled(ray) {
-                None => traverse::any(&self.tree, self.path, ray),
-                Some((scaled, _)) => traverse::any(&self.tree, self.path, &scaled),
-            }
+        if is_ordinary(ray) {
+            return traverse::any(&self.tree, self.path, ray);
+        }
+        rescaled(ray).is_some_and(|(scaled, _)| traverse::any(&self.tree, self.path, &scaled))
     }
 
     /// A box around everything, empty when there is nothing.
@@ -226,7 +224,7 @@ impl Accel {
             bytes: size_of_val(tree.nodes.as_slice())
                 + size_of_val(tree.packs.as_slice())
                 + size_of_val(tree.primitives.as_slice())
-                + size_of_val(self.items.as_slice()),
+                + self.numbering.bytes(),
             degenerate: self.degenerate,
         }
     }
@@ -240,14 +238,19 @@ impl Accel {
     }
 
     fn hit(&self, found: Found) -> Hit {
-        let item = self.items.partition_point(|(_, first)| *first <= found.id) - 1;
-        let (shape, first) = self.items[item];
         let Found { t, u, v, id, part } = found;
+        let (shape, prim) = self.numbering.find(id);
         match part {
-            None => Hit { t, u, v, shape, prim: id - first, instance: NO_INSTANCE },
-            Some((None, prim)) => Hit { t, u, v, shape, prim, instance: NO_INSTANCE },
-            Some((Some(inner), prim)) => Hit { t, u, v, shape: inner, prim, instance: shape },
+            None => Hit { t, u, v, shape, prim, instance: NO_INSTANCE, triangle: id },
+            Some((None, prim)) => Hit { t, u, v, shape, prim, instance: NO_INSTANCE, triangle: NO_TRIANGLE },
+            Some((Some(inner), prim)) => Hit { t, u, v, shape: inner, prim, instance: shape, triangle: NO_TRIANGLE },
         }
+    }
+
+    /// The number of a shape's first primitive, to which a triangle's index is added for [`Ray::ends`].
+    #[must_use]
+    pub fn first_triangle(&self, shape: u32) -> Option<u32> {
+        self.numbering.first(shape)
     }
 }
 
@@ -274,18 +277,25 @@ fn collect_triangles(
     Ok(())
 }
 
-/// For a direction much shorter or longer than 1: the same ray with a direction of about 1, and the power of two that
-/// distances were multiplied with. So reciprocals of the direction stay far from the limits of `f32`.
+/// Whether a ray can be traced as it is: it can hit something, and its direction is neither tiny nor huge.
 #[inline]
-fn rescaled(ray: &Ray) -> Option<(Ray, f64)> {
+fn is_ordinary(ray: &Ray) -> bool {
     let longest = ray.d.abs().max_element();
-    if (1e-3..=1e3).contains(&longest) {
+    (1e-3..=1e3).contains(&longest) && ray.o.is_finite() && ray.t_min < ray.t_max && ray.t_max > 0.0 && !ray.d.is_nan()
+}
+
+/// Of a ray that is not: the same with a direction of about 1, and the power of two that distances were multiplied with.
+/// So reciprocals of the direction stay far from the limits of `f32`. `None` if it cannot hit anything.
+#[cold]
+fn rescaled(ray: &Ray) -> Option<(Ray, f64)> {
+    if !ray.is_traceable() {
         return None;
     }
+    let longest = ray.d.abs().max_element();
     let scale = f64::from_bits(f64::from(longest).to_bits() & EXPONENT);
     let d = (ray.d.as_dvec3() / scale).as_vec3();
     let [t_min, t_max] = [ray.t_min, ray.t_max].map(|t| (f64::from(t) * scale) as f32);
-    Some((Ray { o: ray.o, d, t_min, t_max }, scale))
+    Some((Ray { d, t_min, t_max, ..*ray }, scale))
 }
 
 #[cfg(test)]

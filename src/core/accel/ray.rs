@@ -5,6 +5,9 @@ use glam::Vec3;
 /// [`Hit::instance`] of a hit that is on no instance.
 pub const NO_INSTANCE: u32 = u32::MAX;
 
+/// [`Hit::triangle`] of a hit on anything else.
+pub const NO_TRIANGLE: u32 = u32::MAX;
+
 /// The points `o + t d` with `t_min < t < t_max`.
 ///
 /// `d` need not have unit length: `t` counts multiples of `d`, so it is the same number in the frame of an instance.
@@ -20,19 +23,22 @@ pub struct Ray {
     pub t_min: f32,
     /// Hits at this distance or farther are none.
     pub t_max: f32,
+    /// Triangles by [`Hit::triangle`] that the ray is known to miss, so that nobody needs to find out: the one it begins
+    /// on, once its origin has been moved off that, and the one it ends before. [`NO_TRIANGLE`] where there is none.
+    pub ends: [u32; 2],
 }
 
 impl Ray {
     /// The ray from `o` along `d` without an end.
     #[must_use]
     pub const fn new(o: Vec3, d: Vec3) -> Self {
-        Self { o, d, t_min: 0.0, t_max: f32::INFINITY }
+        Self { o, d, t_min: 0.0, t_max: f32::INFINITY, ends: [NO_TRIANGLE; 2] }
     }
 
     /// The open segment from `from` to `to`, for visibility tests. Both ends must have been moved off their surfaces.
     #[must_use]
     pub fn between(from: Vec3, to: Vec3) -> Self {
-        Self { o: from, d: to - from, t_min: 0.0, t_max: 1.0 }
+        Self { o: from, d: to - from, t_min: 0.0, t_max: 1.0, ends: [NO_TRIANGLE; 2] }
     }
 
     /// The point at `t`, rounded.
@@ -74,4 +80,6 @@ pub struct Hit {
     pub prim: u32,
     /// The shape that is the instance, [`NO_INSTANCE`] when there is none.
     pub instance: u32,
+    /// The number of the triangle among all primitives, for [`Ray::ends`]; [`NO_TRIANGLE`] on anything else.
+    pub triangle: u32,
 }

@@ -16,8 +16,8 @@
 //!
 //! # Why no triangle is missed
 //!
-//! Heights count along the axis of the shear. With M the largest coordinate of a triangle relative to the ray's origin
-//! and R the largest sheared one, sheared coordinates are within 6 u M of exact, edge functions within 36 u M R, their
+//! Heights count along the axis of the shear. With R the largest sheared coordinate of a triangle and M the largest of its
+//! heights plus R, which bounds its coordinates relative to the ray's origin as the slopes are at most 1, sheared coordinates are within 6 u M of exact, edge functions within 36 u M R, their
 //! sum (`area`) within 150 u M R, and their sum times heights (`moment`) within 170 u M² R; moment over area is the height
 //! of the hit. [`ROUNDING`] allows for 256 u: what is left over is more than the rounding of the limits and of `t`, as
 //! area ≤ 6 R² and R ≤ 2 M. [`TINY`] covers numbers so small that they are not rounded relatively. Lanes that may still
@@ -28,6 +28,7 @@ use super::ray::Ray;
 use super::triangle::{Shear, TriangleHit};
 use super::wide::{Frame, Node, Pack, WIDTH, Word};
 use crate::math::Aabb;
+use glam::Vec3A;
 use std::mem::MaybeUninit;
 use std::sync::Arc;
 
@@ -122,38 +123,42 @@ struct Beam {
     height: f32,
     /// Sign of the direction along that axis: turns coordinates along it into heights.
     ahead: f32,
+    /// Height of the origin.
+    origin_height: f32,
+    /// Shear constants for heights.
+    slope: [f32; 2],
+    /// [`Ray::ends`].
+    ends: [u32; 2],
 }
 
 impl Beam {
     #[inline(always)]
-    #[expect(clippy::manual_clamp, reason = "clamp would let NaN pass, which here must become the end of the range")]
     fn new(frame: &Frame, ray: &Ray) -> Self {
-        let tiny = ray.d.abs().max_element() * 1e-18;
-        let o = ray.o - frame.center;
+        let [o, d] = [ray.o - frame.center, ray.d].map(Vec3A::from);
+        let longest = d.abs().max_element();
         let margin = 12.0 * 0.5 * f32::EPSILON * (frame.reach + o.abs().max_element());
-        let mut beam = Self {
-            shear: Shear::new(ray.o, ray.d),
-            inv_d: [0.0; 3],
-            near_offset: [0.0; 3],
-            far_offset: [0.0; 3],
-            near_rows: [0; 3],
-            far_rows: [0; 3],
+        let tiny = Vec3A::splat(longest * 1e-18);
+        let inv = Vec3A::select(d.abs().cmplt(tiny), tiny.copysign(d), d).recip();
+        // Kept finite, also in scenes of 10³⁸, since ∞ − ∞ would let rays into slots that are empty. In this order, the
+        // limits win over NaN.
+        let finite = |v: Vec3A| v.min(Vec3A::MAX).max(Vec3A::MIN);
+        let shear = Shear::new(ray.o, ray.d);
+        let ahead = 1_f32.copysign(shear.d[2]);
+        let sides = [inv.x < 0.0, inv.y < 0.0, inv.z < 0.0].map(|negative| 3 * usize::from(negative));
+        Self {
+            inv_d: inv.to_array(),
+            near_offset: finite(o * inv + margin * inv.abs()).to_array(),
+            far_offset: finite(o * inv - margin * inv.abs()).to_array(),
+            near_rows: [sides[0], 1 + sides[1], 2 + sides[2]],
+            far_rows: [3 - sides[0], 4 - sides[1], 5 - sides[2]],
             t_min: ray.t_min.max(0.0),
-            height: ray.d.abs().max_element(),
-            ahead: 0.0,
-        };
-        beam.ahead = 1_f32.copysign(ray.d[beam.shear.axes[2]]);
-        for axis in 0..3 {
-            let d = if ray.d[axis].abs() < tiny { tiny.copysign(ray.d[axis]) } else { ray.d[axis] };
-            let inv = 1.0 / d;
-            beam.inv_d[axis] = inv;
-            // Kept finite, also in scenes of 10³⁸, since ∞ − ∞ would let rays into slots that are empty.
-            beam.near_offset[axis] = (o[axis] * inv + margin * inv.abs()).min(f32::MAX).max(f32::MIN);
-            beam.far_offset[axis] = (o[axis] * inv - margin * inv.abs()).max(f32::MIN).min(f32::MAX);
-            beam.near_rows[axis] = if inv < 0.0 { axis + 3 } else { axis };
-            beam.far_rows[axis] = if inv < 0.0 { axis } else { axis + 3 };
+            height: longest,
+            ahead,
+            origin_height: shear.o[2] * ahead,
+            slope: shear.s.map(|s| s * ahead),
+            shear,
+            ends: ray.ends,
         }
-        beam
     }
 }
 
@@ -177,13 +182,13 @@ trait Kernel {
     ///
     /// # Safety
     /// The processor has the instructions of the kernel.
-    unsafe fn boxes(beam: &Beam, node: &Node, t_max: f32, near: &mut [f32; WIDTH]) -> u32;
+    unsafe fn boxes<const ANY: bool>(beam: &Beam, node: &Node, t_max: f32, near: &mut [f32; WIDTH]) -> u32;
 
     /// One bit for each triangle that the ray may hit nearer than `t_max`; `near` gets lower bounds of their heights.
     ///
     /// # Safety
     /// The processor has the instructions of the kernel.
-    unsafe fn candidates(beam: &Beam, pack: &Pack, t_max: f32, near: &mut [f32; WIDTH]) -> Candidates;
+    unsafe fn candidates<const ANY: bool>(beam: &Beam, pack: &Pack, t_max: f32, near: &mut [f32; WIDTH]) -> Candidates;
 
     /// Asks for the first two cache lines of an item, which need not exist.
     #[inline(always)]
@@ -194,7 +199,7 @@ struct Portable;
 
 impl Kernel for Portable {
     #[inline(always)]
-    unsafe fn boxes(beam: &Beam, node: &Node, t_max: f32, near: &mut [f32; WIDTH]) -> u32 {
+    unsafe fn boxes<const ANY: bool>(beam: &Beam, node: &Node, t_max: f32, near: &mut [f32; WIDTH]) -> u32 {
         let mut far = [t_max; WIDTH];
         *near = [beam.t_min; WIDTH];
         for axis in 0..3 {
@@ -210,20 +215,22 @@ impl Kernel for Portable {
     }
 
     #[inline(always)]
-    unsafe fn candidates(beam: &Beam, pack: &Pack, t_max: f32, near: &mut [f32; WIDTH]) -> Candidates {
-        let Shear { o, axes, s, .. } = beam.shear;
+    unsafe fn candidates<const ANY: bool>(beam: &Beam, pack: &Pack, t_max: f32, near: &mut [f32; WIDTH]) -> Candidates {
+        let Shear { o, axes, .. } = beam.shear;
         let [low, high] = [beam.t_min, t_max].map(|t| t * beam.height);
         let mut found = Candidates { maybe: 0, sure: 0 };
         for i in 0..WIDTH {
             let (mut reach, mut extent, mut top) = (0.0_f32, 0.0_f32, 0.0_f32);
             let [a, b, c] = pack.vertices.each_ref().map(|rows| {
-                let [x, y, z] = [0, 1, 2].map(|k| rows[axes[k]][i] - o[k]);
-                let p = [x - s[0] * z, y - s[1] * z, z * beam.ahead];
-                reach = reach.max(x.abs()).max(y.abs()).max(z.abs());
+                let [x, y] = [0, 1].map(|k| rows[axes[k]][i] - o[k]);
+                let z = rows[axes[2]][i] * beam.ahead - beam.origin_height;
+                let p = [x - beam.slope[0] * z, y - beam.slope[1] * z, z];
+                reach = reach.max(z.abs());
                 extent = extent.max(p[0].abs()).max(p[1].abs());
-                top = top.max(p[2]);
+                top = top.max(z);
                 p
             });
+            reach += extent;
             let edges = [c[0] * b[1] - c[1] * b[0], a[0] * c[1] - a[1] * c[0], b[0] * a[1] - b[1] * a[0]];
             let negative = (edges[0] < 0.0) | (edges[1] < 0.0) | (edges[2] < 0.0);
             let positive = (edges[0] > 0.0) | (edges[1] > 0.0) | (edges[2] > 0.0);
@@ -233,7 +240,7 @@ impl Kernel for Portable {
             let area_error = reach * extent * ROUNDING + TINY;
             let moment_error = area_error * reach + TINY;
             near[i] = (moment - moment_error) / (area + area_error);
-            let beside = negative & positive;
+            let beside = (negative & positive) | beam.ends.contains(&pack.ids[i]);
             let outside = (top <= 0.0) | (moment < -moment_error) | (near[i] > high);
             let certain =
                 !edges.contains(&0.0) & (near[i] > low) & (moment + moment_error < high * (area - area_error));
@@ -246,7 +253,7 @@ impl Kernel for Portable {
 
 #[cfg(target_arch = "x86_64")]
 mod avx2 {
-    use super::{Beam, Candidates, Found, Kernel, Node, Pack, ROUNDING, Ray, TINY, Tree, WIDTH, walk};
+    use super::{Beam, Candidates, Found, Kernel, Node, Pack, ROUNDING, Ray, Shear, TINY, Tree, WIDTH, walk};
     use std::arch::x86_64::*;
 
     pub fn is_available() -> bool {
@@ -273,15 +280,20 @@ mod avx2 {
 
     impl Kernel for Avx2 {
         #[inline(always)]
-        unsafe fn boxes(beam: &Beam, node: &Node, t_max: f32, near: &mut [f32; WIDTH]) -> u32 {
+        unsafe fn boxes<const ANY: bool>(beam: &Beam, node: &Node, t_max: f32, near: &mut [f32; WIDTH]) -> u32 {
             // SAFETY: the caller vouches for the instructions.
-            unsafe { boxes(beam, node, t_max, near) }
+            unsafe { boxes::<ANY>(beam, node, t_max, near) }
         }
 
         #[inline(always)]
-        unsafe fn candidates(beam: &Beam, pack: &Pack, t_max: f32, near: &mut [f32; WIDTH]) -> Candidates {
+        unsafe fn candidates<const ANY: bool>(
+            beam: &Beam,
+            pack: &Pack,
+            t_max: f32,
+            near: &mut [f32; WIDTH],
+        ) -> Candidates {
             // SAFETY: the caller vouches for the instructions.
-            unsafe { candidates(beam, pack, t_max, near) }
+            unsafe { candidates::<ANY>(beam, pack, t_max, near) }
         }
 
         #[inline(always)]
@@ -309,11 +321,14 @@ mod avx2 {
         _mm256_fmsub_ps(load(row), _mm256_set1_ps(inv), _mm256_set1_ps(offset))
     }
 
+    /// One for each query, although they are the same: each then has a single caller, into which it is inlined.
     #[inline]
-    #[target_feature(enable = "avx2,fma")]
-    fn boxes(beam: &Beam, node: &Node, t_max: f32, near: &mut [f32; WIDTH]) -> u32 {
-        let enter = |axis: usize| distances(&node.rows[beam.near_rows[axis]], beam.inv_d[axis], beam.near_offset[axis]);
-        let leave = |axis: usize| distances(&node.rows[beam.far_rows[axis]], beam.inv_d[axis], beam.far_offset[axis]);
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+    fn boxes<const ANY: bool>(beam: &Beam, node: &Node, t_max: f32, near: &mut [f32; WIDTH]) -> u32 {
+        // SAFETY: rows are numbered 0 to 5 in `Beam::new`, the only place that makes beams.
+        let row = |index: usize| unsafe { node.rows.get_unchecked(index) };
+        let enter = |axis: usize| distances(row(beam.near_rows[axis]), beam.inv_d[axis], beam.near_offset[axis]);
+        let leave = |axis: usize| distances(row(beam.far_rows[axis]), beam.inv_d[axis], beam.far_offset[axis]);
         // A NaN in the first operand yields the second: the box counts as entered.
         let entry = _mm256_max_ps(enter(1), _mm256_max_ps(enter(0), _mm256_set1_ps(beam.t_min)));
         let exit = _mm256_min_ps(leave(1), _mm256_min_ps(leave(0), _mm256_set1_ps(t_max)));
@@ -323,16 +338,30 @@ mod avx2 {
         _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(entry, exit)) as u32
     }
 
-    /// A vertex of each triangle, relative to the ray's origin and sheared, with its height; and its largest coordinate.
+    /// A vertex of each triangle, relative to the ray's origin and sheared, with its height.
     #[inline]
     #[target_feature(enable = "avx2,fma")]
-    fn sheared(rows: &[[f32; WIDTH]; 3], beam: &Beam) -> ([__m256; 3], __m256) {
-        let shear = &beam.shear;
-        let relative = |i: usize| _mm256_sub_ps(load(&rows[shear.axes[i]]), _mm256_set1_ps(shear.o[i]));
-        let [x, y, z] = [relative(0), relative(1), relative(2)];
-        let moved = |p: __m256, s: f32| _mm256_sub_ps(p, _mm256_mul_ps(_mm256_set1_ps(s), z));
-        let ahead = _mm256_mul_ps(z, _mm256_set1_ps(beam.ahead));
-        ([moved(x, shear.s[0]), moved(y, shear.s[1]), ahead], _mm256_max_ps(_mm256_max_ps(abs(x), abs(y)), abs(z)))
+    fn sheared(rows: &[[f32; WIDTH]; 3], beam: &Beam) -> [__m256; 3] {
+        let Shear { axes, o, .. } = &beam.shear;
+        // SAFETY: axes are numbered 0 to 2 in `Shear::new`, the only place that makes them.
+        let row = |i: usize| load(unsafe { rows.get_unchecked(axes[i]) });
+        // Fused or not is all the same here, as the sign changes nothing.
+        let z = _mm256_fmsub_ps(row(2), _mm256_set1_ps(beam.ahead), _mm256_set1_ps(beam.origin_height));
+        let moved = |i: usize| {
+            let slope = _mm256_mul_ps(_mm256_set1_ps(beam.slope[i]), z);
+            _mm256_sub_ps(_mm256_sub_ps(row(i), _mm256_set1_ps(o[i])), slope)
+        };
+        [moved(0), moved(1), z]
+    }
+
+    /// Lanes of a pack that hold one of two triangles.
+    #[inline]
+    #[target_feature(enable = "avx2,fma")]
+    fn listed(ids: &[u32; WIDTH], [one, other]: [u32; 2]) -> __m256 {
+        // SAFETY: eight integers; no alignment is asked for.
+        let ids = unsafe { _mm256_loadu_si256(ids.as_ptr().cast()) };
+        let equal = |id: u32| _mm256_cmpeq_epi32(ids, _mm256_set1_epi32(id as i32));
+        _mm256_castsi256_ps(_mm256_or_si256(equal(one), equal(other)))
     }
 
     #[inline]
@@ -342,9 +371,9 @@ mod avx2 {
     }
 
     #[inline]
-    #[target_feature(enable = "avx2,fma")]
-    fn candidates(beam: &Beam, pack: &Pack, t_max: f32, near: &mut [f32; WIDTH]) -> Candidates {
-        let [(a, a_reach), (b, b_reach), (c, c_reach)] = [0, 1, 2].map(|vertex| sheared(&pack.vertices[vertex], beam));
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+    fn candidates<const ANY: bool>(beam: &Beam, pack: &Pack, t_max: f32, near: &mut [f32; WIDTH]) -> Candidates {
+        let [a, b, c] = [0, 1, 2].map(|vertex| sheared(&pack.vertices[vertex], beam));
         let cross =
             |p: [__m256; 3], q: [__m256; 3]| _mm256_sub_ps(_mm256_mul_ps(p[0], q[1]), _mm256_mul_ps(p[1], q[0]));
         let [u, v, w] = [cross(c, b), cross(a, c), cross(b, a)];
@@ -355,6 +384,7 @@ mod avx2 {
         let any_positive = _mm256_cmp_ps::<_CMP_GT_OQ>(max(u, v, w), zero);
         let beside = _mm256_and_ps(any_negative, any_positive);
         let inside = _mm256_andnot_ps(beside, _mm256_cmp_ps::<_CMP_GT_OQ>(max(a[2], b[2], c[2]), zero));
+        let inside = _mm256_andnot_ps(listed(&pack.ids, beam.ends), inside);
         if _mm256_testz_ps(inside, inside) != 0 {
             return Candidates { maybe: 0, sure: 0 };
         }
@@ -364,8 +394,9 @@ mod avx2 {
         let moment = _mm256_fmadd_ps(u, a[2], _mm256_fmadd_ps(v, b[2], _mm256_mul_ps(w, c[2])));
         let moment = _mm256_xor_ps(moment, sign);
         let extent = |i: usize| max(abs(a[i]), abs(b[i]), abs(c[i]));
+        let heights = extent(2);
         let extent = _mm256_max_ps(extent(0), extent(1));
-        let reach = max(a_reach, b_reach, c_reach);
+        let reach = _mm256_add_ps(heights, extent);
         let tiny = _mm256_set1_ps(TINY);
         let area_error = _mm256_fmadd_ps(_mm256_mul_ps(reach, _mm256_set1_ps(ROUNDING)), extent, tiny);
         let moment_error = _mm256_fmadd_ps(area_error, reach, tiny);
@@ -379,6 +410,9 @@ mod avx2 {
         let behind = _mm256_cmp_ps::<_CMP_LT_OQ>(most, zero);
         let beyond = _mm256_cmp_ps::<_CMP_GT_OQ>(nearest, high);
         let maybe = _mm256_andnot_ps(_mm256_or_ps(behind, beyond), inside);
+        if !ANY {
+            return Candidates { maybe: _mm256_movemask_ps(maybe) as u32, sure: 0 };
+        }
         let ends = _mm256_cmp_ps::<_CMP_LT_OQ>(most, _mm256_mul_ps(high, _mm256_sub_ps(area, area_error)));
         let begins = _mm256_cmp_ps::<_CMP_GT_OQ>(nearest, low);
         let smallest = min(abs(u), abs(v), abs(w));
@@ -448,7 +482,7 @@ fn walk<K: Kernel, const ANY: bool>(tree: &Tree, ray: &Ray) -> Option<Found> {
         if word.is_node() {
             let node = &tree.nodes[word.index()];
             // SAFETY: `walk` runs with a kernel only inside of a function compiled for its instructions.
-            let mut mask = unsafe { K::boxes(&beam, node, best.t, &mut near) };
+            let mut mask = unsafe { K::boxes::<ANY>(&beam, node, best.t, &mut near) };
             if mask.is_power_of_two() {
                 word = node.children[mask.trailing_zeros() as usize];
                 continue;
@@ -487,7 +521,7 @@ fn walk<K: Kernel, const ANY: bool>(tree: &Tree, ray: &Ray) -> Option<Found> {
         } else {
             let pack = &tree.packs[word.index()];
             // SAFETY: as above.
-            let Candidates { maybe: mut mask, sure } = unsafe { K::candidates(&beam, pack, best.t, &mut near) };
+            let Candidates { maybe: mut mask, sure } = unsafe { K::candidates::<ANY>(&beam, pack, best.t, &mut near) };
             if ANY && sure != 0 {
                 let id = pack.ids[sure.trailing_zeros() as usize & (WIDTH - 1)];
                 return Some(Found { t: 0.0, u: 0.0, v: 0.0, id, part: None });

@@ -23,8 +23,8 @@ pub struct Shear {
     pub axes: [usize; 3],
     /// Shear constants `d_x / d_z` and `d_y / d_z` of the permuted direction.
     pub s: [f32; 2],
-    s64: [f64; 2],
-    inv_dz: f64,
+    /// The ray's direction, by permuted axis.
+    pub d: [f32; 3],
 }
 
 /// A point of a triangle on a ray.
@@ -39,21 +39,21 @@ pub struct TriangleHit {
 }
 
 impl Shear {
+    /// Permutations that put the first, second or third axis last.
+    const AXES: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
+
     /// `d` must be finite and not 0.
     #[inline(always)]
     #[must_use]
     pub fn new(o: Vec3, d: Vec3) -> Self {
-        let z = if d.x.abs() > d.y.abs() {
-            if d.x.abs() > d.z.abs() { 0 } else { 2 }
-        } else if d.y.abs() > d.z.abs() {
-            1
-        } else {
-            2
-        };
-        let axes = [[1, 2, 0], [2, 0, 1], [0, 1, 2]][z];
-        let inv_dz = 1.0 / f64::from(d[z]);
-        let s64 = [f64::from(d[axes[0]]) * inv_dz, f64::from(d[axes[1]]) * inv_dz];
-        Self { o: axes.map(|a| o[a]), axes, s: s64.map(|s| s as f32), s64, inv_dz }
+        // Without branches, which no processor could foresee: the longest axis changes from ray to ray.
+        let [x, y, z] = d.abs().to_array();
+        let longest = if x.max(y) > z { usize::from(x <= y) } else { 2 };
+        let axes = Self::AXES[longest];
+        // Indexing a `Vec3` would compare, indexing an array looks up.
+        let [o, d] = [o, d].map(|v| v.to_array());
+        let d = axes.map(|a| d[a]);
+        Self { o: axes.map(|a| o[a]), axes, s: [d[0] / d[2], d[1] / d[2]], d }
     }
 
     /// The corners of a triangle with their coordinates in the order of [`axes`](Self::axes).
@@ -82,12 +82,14 @@ impl Shear {
             return None;
         }
 
+        let d = self.d.map(f64::from);
         let mut heights = [0.0; 3];
         let mut sheared = [[0.0; 2]; 3];
         for ((p, height), s) in points.iter().zip(&mut heights).zip(&mut sheared) {
             let [px, py, pz]: [f64; 3] = std::array::from_fn(|i| f64::from(p[i]) - f64::from(self.o[i]));
             *height = pz;
-            *s = [px - self.s64[0] * pz, py - self.s64[1] * pz];
+            // Not divided by d_z: the division below takes care of it.
+            *s = [px * d[2] - d[0] * pz, py * d[2] - d[1] * pz];
         }
         let sign = if any_positive { 1.0 } else { -1.0 };
         let mut weights = edge_functions(sheared).map(|e| (e * sign).max(0.0));
@@ -97,9 +99,9 @@ impl Shear {
             weights = exact_edge_functions(rounded).map(f64::abs);
             sum = weights[0] + weights[1] + weights[2];
         }
-        let scale = 1.0 / sum;
-        let height = (weights[0] * heights[0] + weights[1] * heights[1] + weights[2] * heights[2]) * scale;
-        let t = (height * self.inv_dz) as f32;
+        let inverse = 1.0 / (sum * d[2]);
+        let scale = inverse * d[2];
+        let t = ((weights[0] * heights[0] + weights[1] * heights[1] + weights[2] * heights[2]) * inverse) as f32;
         t.is_finite().then_some(TriangleHit { t, u: (weights[1] * scale) as f32, v: (weights[2] * scale) as f32 })
     }
 }

@@ -1,6 +1,7 @@
 //! Light sources.
 
 use super::SurfaceHit;
+use crate::accel::NO_TRIANGLE;
 use crate::color::Rgb;
 use crate::math::{Vec2, Vec3};
 use std::ops::BitOr;
@@ -44,19 +45,22 @@ pub struct LightPoint {
     pub d: Vec3,
     /// Distance; infinite for an environment.
     pub distance: f32,
+    /// The triangle it lies on: as a light gives it the index in its shape, from the scene the number for
+    /// [`Ray::ends`](crate::accel::Ray::ends); [`NO_TRIANGLE`] where there is none.
+    pub triangle: u32,
 }
 
 impl LightPoint {
     /// The light hit by a ray that left the reference point in unit direction `d`.
     #[inline]
     pub fn of_hit(from: Vec3, hit: &SurfaceHit, d: Vec3) -> Self {
-        LightPoint { p: hit.p, n: hit.n, uv: hit.uv, d, distance: (hit.p - from).length() }
+        LightPoint { p: hit.p, n: hit.n, uv: hit.uv, d, distance: (hit.p - from).length(), triangle: hit.triangle }
     }
 
     /// The environment in unit direction `d`.
     #[inline]
     pub fn of_environment(d: Vec3) -> Self {
-        LightPoint { p: Vec3::ZERO, n: -d, uv: Vec2::ZERO, d, distance: f32::INFINITY }
+        LightPoint { p: Vec3::ZERO, n: -d, uv: Vec2::ZERO, d, distance: f32::INFINITY, triangle: NO_TRIANGLE }
     }
 }
 

@@ -19,6 +19,8 @@ pub struct AreaSample {
     pub uv: Vec2,
     /// Density: per unit area, or per solid angle where the method says so.
     pub pdf: f32,
+    /// The triangle of a mesh, [`NO_TRIANGLE`](crate::accel::NO_TRIANGLE) on anything else.
+    pub triangle: u32,
 }
 
 impl AreaSample {
@@ -31,7 +33,8 @@ impl AreaSample {
         let d = d / distance;
         let cos = d.dot(self.n).abs();
         let pdf = self.pdf * distance_squared / cos;
-        (pdf.is_finite() && pdf > 0.0).then_some((LightPoint { p: self.p, n: self.n, uv: self.uv, d, distance }, pdf))
+        let AreaSample { p, n, uv, triangle, .. } = *self;
+        (pdf.is_finite() && pdf > 0.0).then_some((LightPoint { p, n, uv, d, distance, triangle }, pdf))
     }
 }
 
@@ -51,8 +54,9 @@ pub trait Shape: Send + Sync {
     /// Surface area in square scene units.
     fn area(&self) -> f32;
 
-    /// The hit in full: all of [`SurfaceHit`] but `shape`, `instance` and `wi`, which the scene fills in.
-    fn surface(&self, ray: &Ray, hit: &Hit) -> SurfaceHit;
+    /// Writes the hit in full: all of [`SurfaceHit`] but what the scene fills in, namely `wi` and the numbers from `shape` on.
+    /// In place, since copying it would cost more than most shapes need to find it.
+    fn surface(&self, ray: &Ray, hit: &Hit, into: &mut SurfaceHit);
 
     /// A point uniform in area; `pdf` per unit area.
     fn sample_area(&self, u2: Vec2) -> Option<AreaSample>;
@@ -70,8 +74,8 @@ pub trait Shape: Send + Sync {
         if pdf.is_finite() { pdf } else { 0.0 }
     }
 
-    /// The surface point at texture coordinates: the hit (with `p`, `n`, `uv`, `dp_du`, `dp_dv`), if the
-    /// parametrisation can be inverted there.
+    /// The surface point at texture coordinates: the hit (with `p`, `n`, `uv`, `dp_du`, `dp_dv`, and as `triangle` the
+    /// index of the triangle), if the parametrisation can be inverted there.
     fn at_uv(&self, _uv: Vec2) -> Option<SurfaceHit> {
         None
     }

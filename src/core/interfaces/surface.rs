@@ -1,6 +1,6 @@
 //! A point of a surface that a ray has hit.
 
-use crate::accel::NO_INSTANCE;
+use crate::accel::{NO_INSTANCE, NO_TRIANGLE, Ray};
 use crate::math::{Frame, Vec2, Vec3, error_bounds};
 
 /// Everything known about a hit before the material is asked. World space.
@@ -32,6 +32,8 @@ pub struct SurfaceHit {
     pub barycentric: Vec2,
     /// Index of the instance in the scene, or [`NO_INSTANCE`].
     pub instance: u32,
+    /// The triangle's number for [`Ray::ends`], or [`NO_TRIANGLE`].
+    pub triangle: u32,
 }
 
 impl Default for SurfaceHit {
@@ -50,6 +52,7 @@ impl Default for SurfaceHit {
             prim: 0,
             barycentric: Vec2::ZERO,
             instance: NO_INSTANCE,
+            triangle: NO_TRIANGLE,
         }
     }
 }
@@ -65,6 +68,12 @@ impl SurfaceHit {
     #[inline]
     pub fn to_local(&self, v: Vec3) -> Vec3 {
         self.frame.to_local(v)
+    }
+
+    /// The ray that leaves in world direction `d`, without an end.
+    #[inline]
+    pub fn leave(&self, d: Vec3) -> Ray {
+        Ray { ends: [self.triangle, NO_TRIANGLE], ..Ray::new(self.origin_towards(d), d) }
     }
 
     /// Where a ray that leaves in world direction `d` starts.

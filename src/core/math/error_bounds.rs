@@ -6,6 +6,7 @@
 //! size of the scene.
 
 use super::Vec3;
+use glam::Vec3A;
 
 /// Unit roundoff of `f32`.
 const UNIT: f32 = f32::EPSILON * 0.5;
@@ -21,19 +22,17 @@ pub const fn gamma(n: u32) -> f32 {
 /// points to, out of the box of half size `p_error`, then rounded away from the surface.
 #[inline]
 pub fn offset_origin(p: Vec3, p_error: Vec3, n: Vec3, d: Vec3) -> Vec3 {
+    let [p, p_error, n, d] = [p, p_error, n, d].map(Vec3A::from);
     let offset = n * n.abs().dot(p_error).copysign(d.dot(n));
-    let start = p + offset;
-    Vec3::new(round_away(start.x, offset.x), round_away(start.y, offset.y), round_away(start.z, offset.z))
+    Vec3::from(round_away(p + offset, offset))
 }
 
-/// The next number towards `direction`, or `x` itself where that is 0. Both are finite. Without branches.
+/// On each axis a number beyond `x` towards `direction`, by a few roundings at most; `x` itself where that is 0.
 #[inline]
-fn round_away(x: f32, direction: f32) -> f32 {
-    let x = if x == 0.0 { 0_f32.copysign(direction) } else { x };
-    // Bits of positive numbers grow with the number, those of negative ones shrink.
-    let outwards = i32::from((x > 0.0) == (direction > 0.0) || x == 0.0) * 2 - 1;
-    let step = if direction == 0.0 { 0 } else { outwards };
-    f32::from_bits(x.to_bits().wrapping_add_signed(step))
+fn round_away(x: Vec3A, direction: Vec3A) -> Vec3A {
+    // Half an ulp would do for all but powers of two, and the smallest number for those too small for a relative step.
+    let step = (x.abs() * f32::EPSILON).max(Vec3A::splat(f32::from_bits(1)));
+    Vec3A::select(direction.cmpeq(Vec3A::ZERO), x, x + step.copysign(direction))
 }
 
 #[cfg(test)]
@@ -41,12 +40,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rounds_to_the_next_number() {
+    fn rounds_beyond_the_number_but_not_far() {
         for x in [0.0, -0.0, 1.0, -1.0, 1e-45, -1e-45, 1e10, -3.3e-39] {
-            assert_eq!(round_away(x, 2.0), x.next_up(), "{x}");
-            assert_eq!(round_away(x, -1e-30), x.next_down(), "{x}");
-            assert_eq!(round_away(x, 0.0), x);
-            assert_eq!(round_away(x, -0.0), x);
+            let away = |direction: f32| {
+                let moved = round_away(Vec3A::splat(x), Vec3A::splat(direction));
+                assert!(moved == Vec3A::splat(moved.x));
+                moved.x
+            };
+            let limit = x.abs() * 2.5e-7;
+            assert!(away(2.0) >= x.next_up() && away(2.0) - x <= limit.max(2e-45), "{x}");
+            assert!(away(-1e-30) <= x.next_down() && x - away(-1e-30) <= limit.max(2e-45), "{x}");
+            assert_eq!(away(0.0), x);
+            assert_eq!(away(-0.0), x);
         }
     }
 

@@ -1,7 +1,7 @@
 //! A scene that can be rendered.
 
 use super::object::{BuiltSensor, BuiltShape};
-use crate::accel::{Accel, BuildOptions, Geometry, Hit, NO_INSTANCE, Ray};
+use crate::accel::{Accel, BuildOptions, Geometry, Hit, NO_INSTANCE, NO_TRIANGLE, Ray};
 use crate::color::Rgb;
 use crate::interfaces::{Bsdf, Emitter, EmitterFlags, Integrator, LightPoint, LightSample, SurfaceHit};
 use crate::math::{ONE_MINUS_EPSILON, Transform, Vec2, Vec3};
@@ -49,6 +49,8 @@ fn build_accel(shapes: &[BuiltShape]) -> Result<Accel, String> {
 pub struct Scene {
     shapes: Vec<BuiltShape>,
     emitters: Vec<Arc<dyn Emitter>>,
+    /// For each emitter, the number of its shape's first triangle for [`Ray::ends`].
+    first_triangles: Vec<u32>,
     /// For each shape its emitter, or [`NO_EMITTER`].
     emitter_of_shape: Vec<u32>,
     environment: Option<EmitterId>,
@@ -74,6 +76,7 @@ impl Scene {
         let mut emitter_of_shape = vec![NO_EMITTER; shapes.len()];
         let mut emitters: Vec<Arc<dyn Emitter>> = Vec::with_capacity(order.len());
         let mut environment = None;
+        let mut first_triangles = Vec::with_capacity(order.len());
         for source in order {
             let id = emitters.len() as u32;
             match source {
@@ -81,6 +84,7 @@ impl Scene {
                     if let Some(emitter) = &shapes[*shape].emitter {
                         emitter_of_shape[*shape] = id;
                         emitters.push(emitter.clone());
+                        first_triangles.push(accel.first_triangle(*shape as u32).unwrap_or(NO_TRIANGLE));
                     }
                 }
                 EmitterSource::Free(emitter) => {
@@ -88,6 +92,7 @@ impl Scene {
                         environment = Some(EmitterId(id));
                     }
                     emitters.push(emitter.clone());
+                    first_triangles.push(NO_TRIANGLE);
                 }
             }
         }
@@ -101,6 +106,7 @@ impl Scene {
         Ok(Scene {
             shapes,
             emitters,
+            first_triangles,
             emitter_of_shape,
             environment,
             accel,
@@ -127,30 +133,42 @@ impl Scene {
     /// a surface with the given error bound and normal.
     #[inline]
     pub fn segment_occluded(&self, from: Vec3, to: Vec3) -> bool {
-        self.occluded(&Ray { o: from, d: to - from, t_min: 0.0, t_max: 1.0 })
+        self.occluded(&Ray::between(from, to))
     }
 
     /// The nearest hit in full.
     #[inline]
     pub fn intersect_surface(&self, ray: &Ray) -> Option<SurfaceHit> {
-        self.intersect(ray).map(|hit| self.surface(ray, &hit))
+        let mut surface = SurfaceHit::default();
+        self.find_surface(ray, &mut surface).then_some(surface)
     }
 
-    /// A hit in full.
-    pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfaceHit {
-        let mut surface = if hit.instance == NO_INSTANCE {
-            self.shapes[hit.shape as usize].shape.surface(ray, hit)
+    /// The nearest hit in full, written in place; whether there is any.
+    #[inline]
+    pub fn find_surface(&self, ray: &Ray, surface: &mut SurfaceHit) -> bool {
+        let hit = self.intersect(ray);
+        if let Some(hit) = &hit {
+            self.surface(ray, hit, surface);
+        }
+        hit.is_some()
+    }
+
+    /// A hit in full, written in place.
+    #[inline]
+    pub fn surface(&self, ray: &Ray, hit: &Hit, surface: &mut SurfaceHit) {
+        if hit.instance == NO_INSTANCE {
+            self.shapes[hit.shape as usize].shape.surface(ray, hit, surface);
         } else {
-            self.instance_surface(ray, hit)
-        };
+            self.instance_surface(ray, hit, surface);
+        }
         surface.shape = hit.shape;
         surface.prim = hit.prim;
         surface.instance = hit.instance;
+        surface.triangle = hit.triangle;
         surface.wi = surface.frame.to_local(-ray.d);
         if self.reference_offsets {
-            surface.p_error = reference_offset(&surface);
+            surface.p_error = reference_offset(surface);
         }
-        surface
     }
 
     /// Lets rays start as far off surfaces as the reference's do, instead of just outside the rounding error: only for
@@ -160,7 +178,7 @@ impl Scene {
     }
 
     #[cold]
-    fn instance_surface(&self, ray: &Ray, hit: &Hit) -> SurfaceHit {
+    fn instance_surface(&self, ray: &Ray, hit: &Hit, surface: &mut SurfaceHit) {
         let instance = &self.shapes[hit.instance as usize].shape;
         match instance.instance() {
             Some((group, to_world)) => {
@@ -169,11 +187,12 @@ impl Scene {
                     d: to_world.inverse_vector(ray.d),
                     t_min: ray.t_min,
                     t_max: ray.t_max,
+                    ends: [NO_TRIANGLE; 2],
                 };
-                let inner = group.shapes[hit.shape as usize].shape.surface(&local, hit);
-                transform_hit(&inner, to_world)
+                group.shapes[hit.shape as usize].shape.surface(&local, hit, surface);
+                *surface = transform_hit(surface, to_world);
             }
-            None => instance.surface(ray, hit),
+            None => instance.surface(ray, hit, surface),
         }
     }
 
@@ -283,6 +302,8 @@ impl Scene {
         let mut sample = self.emitter(id).sample_direct(from, u2)?;
         sample.pdf *= pmf;
         sample.weight = sample.weight / pmf;
+        let triangle = &mut sample.point.triangle;
+        *triangle = triangle.saturating_add(self.first_triangles[id.0 as usize]);
         Some((id, sample))
     }
 
@@ -317,11 +338,11 @@ fn reference_offset(hit: &SurfaceHit) -> Vec3 {
 pub fn shadow_ray(hit: &SurfaceHit, light: &LightSample) -> Ray {
     let point = &light.point;
     if point.distance.is_infinite() {
-        return Ray { o: hit.origin_towards(point.d), d: point.d, t_min: 0.0, t_max: f32::INFINITY };
+        return hit.leave(point.d);
     }
     let o = hit.origin_towards(point.d);
     let to = crate::math::error_bounds::offset_origin(point.p, light.p_error, point.n, o - point.p);
-    Ray { o, d: to - o, t_min: 0.0, t_max: 1.0 }
+    Ray { o, d: to - o, t_min: 0.0, t_max: 1.0, ends: [hit.triangle, point.triangle] }
 }
 
 /// A hit of a group's shape in world space.

@@ -90,7 +90,7 @@ fn hc_g17_instances_equal_moved_copies() {
             .enumerate()
             .filter_map(|(i, (scale, offset))| {
                 let local = Ray::new((ray.o - *offset) / *scale, ray.d / *scale);
-                group.intersect(&local).map(|hit| Hit { instance: i as u32, ..hit })
+                group.intersect(&local).map(|hit| Hit { instance: i as u32, triangle: NO_TRIANGLE, ..hit })
             })
             .min_by(|a, b| a.t.total_cmp(&b.t).then(a.instance.cmp(&b.instance)));
         assert_eq!(accel.intersect(&ray), expected);

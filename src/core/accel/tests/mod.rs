@@ -120,6 +120,7 @@ fn build(meshes: &[&Mesh], options: &BuildOptions) -> Accel {
 fn brute_force(meshes: &[&Mesh], ray: &Ray) -> Option<Hit> {
     let shear = Shear::new(ray.o, ray.d);
     let mut best: Option<Hit> = None;
+    let mut first = 0;
     for (shape, mesh) in meshes.iter().enumerate() {
         for prim in 0..mesh.triangles.len() {
             let corners = mesh.corners(prim);
@@ -129,9 +130,11 @@ fn brute_force(meshes: &[&Mesh], ray: &Ray) -> Option<Hit> {
             let Some(hit) = shear.intersect(shear.permuted(corners)) else { continue };
             if hit.t > ray.t_min && hit.t < best.map_or(ray.t_max, |b| b.t) {
                 let (shape, prim) = (shape as u32, prim as u32);
-                best = Some(Hit { t: hit.t, u: hit.u, v: hit.v, shape, prim, instance: NO_INSTANCE });
+                let triangle = first + prim;
+                best = Some(Hit { t: hit.t, u: hit.u, v: hit.v, shape, prim, instance: NO_INSTANCE, triangle });
             }
         }
+        first += mesh.triangles.len() as u32;
     }
     best
 }
@@ -145,7 +148,7 @@ fn test_ray(i: usize, random: &mut Random) -> Ray {
         d = Vec3::from_array(std::array::from_fn(|a| if a == axis { d[axis] } else { 0.0 }));
     }
     let t_max = if i.is_multiple_of(7) { random.signed().abs() } else { f32::INFINITY };
-    Ray { o, d, t_min: if i.is_multiple_of(11) { 0.1 } else { 0.0 }, t_max }
+    Ray { t_min: if i.is_multiple_of(11) { 0.1 } else { 0.0 }, t_max, ..Ray::new(o, d) }
 }
 
 #[test]
