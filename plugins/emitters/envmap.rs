@@ -143,7 +143,9 @@ impl EnvMap {
     /// Texture coordinates of a local direction, `u` counted from the middle of the first column.
     fn uv_of(&self, d: Vec3) -> Vec2 {
         let u = d.x.atan2(-d.z) * (0.5 * FRAC_1_PI) - self.half_texel();
-        Vec2::new(u, d.y.clamp(-1.0, 1.0).acos() * FRAC_1_PI)
+        // Not the arc cosine of y, of which little is left near the poles, where the density depends on it.
+        let theta = (d.x * d.x + d.z * d.z).sqrt().atan2(d.y);
+        Vec2::new(u, theta * FRAC_1_PI)
     }
 
     fn to_local(&self, d: Vec3) -> Vec3 {
