@@ -151,18 +151,18 @@ impl Microfacets {
             (sin, cos, 1.0 / (sqr(cos / self.alpha_u) + sqr(sin / self.alpha_v)))
         };
         let area = PI * self.alpha_u * self.alpha_v;
-        let (cos_theta, pdf) = match self.shape {
-            Shape::Beckmann => {
-                let cos = 1.0 / (1.0 - alpha2 * (1.0 - u.x).ln()).sqrt();
-                (cos, (1.0 - u.x) / (area * (cos * cos * cos).max(1e-20)))
-            }
-            Shape::Ggx => {
-                let tan2 = alpha2 * u.x / (1.0 - u.x);
-                let cos = 1.0 / (1.0 + tan2).sqrt();
-                (cos, 1.0 / (area * (cos * cos * cos).max(1e-20) * sqr(1.0 + tan2 / alpha2)))
-            }
+        let tan2 = match self.shape {
+            Shape::Beckmann => -alpha2 * (1.0 - u.x).ln(),
+            Shape::Ggx => alpha2 * u.x / (1.0 - u.x),
         };
-        let sin_theta = safe_sqrt(1.0 - cos_theta * cos_theta);
+        let cos_theta = 1.0 / (1.0 + tan2).sqrt();
+        let shape = match self.shape {
+            Shape::Beckmann => 1.0 - u.x,
+            Shape::Ggx => 1.0 / sqr(1.0 + tan2 / alpha2),
+        };
+        let pdf = shape / (area * (cos_theta * cos_theta * cos_theta).max(1e-20));
+        // Not the root of 1 − cos²: it would lose half the digits of a small angle, and with them the density.
+        let sin_theta = tan2.sqrt() * cos_theta;
         (Vec3::new(cos_phi * sin_theta, sin_phi * sin_theta, cos_theta), pdf)
     }
 

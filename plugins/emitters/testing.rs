@@ -1,8 +1,7 @@
 //! What the tests of emitters and textures share.
 
-use lucerna_core::interfaces::{Emitter, LightPoint};
+use lucerna_core::interfaces::Emitter;
 use lucerna_core::math::{DMat4, Vec2, Vec3};
-use lucerna_core::sampling::{Pcg32, warp};
 use lucerna_core::scene::{
     Description, Location, Node, NodeId, Object, ObjectKind, Parameter, SceneErrors, Value, build_one,
 };
@@ -142,69 +141,4 @@ pub(crate) fn assert_golden(light: &dyn Emitter, case: &str) {
             assert_close(&got[..5], &expected[..5], case);
         }
     }
-}
-
-/// Density and radiance of samples agree with those of the points they give.
-pub(crate) fn assert_consistent(light: &dyn Emitter) {
-    let mut rng = Pcg32::new(5, 1);
-    for _ in 0..10_000 {
-        let u2 = Vec2::new(rng.next_f32(), rng.next_f32());
-        let sample = light.sample_direct(Vec3::ZERO, u2).expect("there is light everywhere");
-        let pdf = light.pdf_direct(Vec3::ZERO, &sample.point);
-        let radiance = light.background(sample.point.d);
-        // Near the poles and edges of texels the direction is not exact enough to come back to the same texel.
-        assert!((pdf - sample.pdf).abs() <= 5e-3 * sample.pdf, "{u2}: {pdf} is not {}", sample.pdf);
-        let scale = 5e-3 * radiance.max_component().max(sample.weight.max_component() * sample.pdf);
-        for channel in 0..3 {
-            assert!((sample.weight[channel] * sample.pdf - radiance[channel]).abs() <= scale, "{u2}");
-        }
-    }
-}
-
-/// Directions come as often as their density says (χ² test over 10 × 20 cells of equal solid angle).
-pub(crate) fn assert_density_is_sampled(light: &dyn Emitter) {
-    const SAMPLES: u32 = 100_000;
-    const ROWS: usize = 10;
-    const COLUMNS: usize = 20;
-    /// Per cell and axis, for the integral of the density.
-    const STEPS: usize = 60;
-    let mut rng = Pcg32::new(9, 1);
-    let mut counts = [0.0f64; ROWS * COLUMNS];
-    for _ in 0..SAMPLES {
-        let u2 = Vec2::new(rng.next_f32(), rng.next_f32());
-        let Some(d) = light.sample_direct(Vec3::ZERO, u2).map(|s| s.point.d) else { continue };
-        let row = ((0.5 - 0.5 * d.z) * ROWS as f32) as usize;
-        let column = (warp::azimuth(d.x, d.y) / std::f32::consts::TAU * COLUMNS as f32) as usize;
-        counts[row.min(ROWS - 1) * COLUMNS + column.min(COLUMNS - 1)] += 1.0;
-    }
-    let mut total = 0.0;
-    let (mut chi2, mut cells) = (0.0, -1.0f64);
-    let (mut rest_count, mut rest_expected) = (0.0, 0.0);
-    for (cell, count) in counts.iter().enumerate() {
-        let mut mean = 0.0;
-        for i in 0..STEPS * STEPS {
-            let x = ((cell % COLUMNS) as f32 + ((i % STEPS) as f32 + 0.5) / STEPS as f32) / COLUMNS as f32;
-            let y = ((cell / COLUMNS) as f32 + ((i / STEPS) as f32 + 0.5) / STEPS as f32) / ROWS as f32;
-            let d = warp::square_to_sphere(Vec2::new(x, y));
-            mean += f64::from(light.pdf_direct(Vec3::ZERO, &LightPoint::of_environment(d)));
-        }
-        let probability = mean / (STEPS * STEPS) as f64 / f64::from(warp::SPHERE_PDF) / (ROWS * COLUMNS) as f64;
-        total += probability;
-        let expected = probability * f64::from(SAMPLES);
-        if expected < 20.0 {
-            rest_count += count;
-            rest_expected += expected;
-        } else {
-            chi2 += (count - expected).powi(2) / expected;
-            cells += 1.0;
-        }
-    }
-    if rest_expected > 20.0 {
-        chi2 += (rest_count - rest_expected).powi(2) / rest_expected;
-        cells += 1.0;
-    }
-    assert!((total - 1.0).abs() < 5e-3, "the density integrates to {total}");
-    // Wilson and Hilferty 1931; 3.7 standard deviations are passed once in ten thousand times.
-    let limit = cells * (1.0 - 2.0 / (9.0 * cells) + 3.7 * (2.0 / (9.0 * cells)).sqrt()).powi(3);
-    assert!(chi2 < limit, "χ² is {chi2}, the limit {limit}");
 }

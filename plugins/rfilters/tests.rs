@@ -10,45 +10,6 @@ fn filter(plugin: &str) -> Arc<dyn Rfilter> {
     }
 }
 
-fn integral(filter: &dyn Rfilter) -> f64 {
-    let (radius, steps) = (f64::from(filter.radius()), 20_000);
-    let step = 2.0 * radius / f64::from(steps);
-    (0..steps).map(|i| f64::from(filter.eval((-radius + (f64::from(i) + 0.5) * step) as f32)) * step).sum()
-}
-
-#[test]
-fn integrals_are_known() {
-    // ∫ exp(−2x²) over [−2, 2] is √(π/2) erf(2√2), less the offset times the width.
-    let gaussian = (std::f64::consts::PI / 2.0).sqrt() * 0.999_936_657_5 - 4.0 * (-8.0f64).exp();
-    // ∫ sinc(x) sinc(x/3) over [−3, 3], by quadrature in extended precision.
-    let expected = [
-        ("box", 1.0),
-        ("tent", 1.0),
-        ("gaussian", gaussian),
-        ("mitchell", 1.0),
-        ("catmullrom", 1.0),
-        ("lanczos", 0.997_055_3),
-    ];
-    for (plugin, value) in expected {
-        let found = integral(&*filter(plugin));
-        assert!((found - value).abs() < 2e-5, "{plugin}: {found} instead of {value}");
-    }
-}
-
-#[test]
-fn even_and_zero_outside() {
-    for plugin in ["tent", "gaussian", "mitchell", "catmullrom", "lanczos"] {
-        let filter = filter(plugin);
-        for x in [0.0, 0.3, 0.9, 1.4, 1.99] {
-            assert_eq!(filter.eval(x), filter.eval(-x), "{plugin}({x})");
-        }
-        for x in [filter.radius(), filter.radius() * 1.01, 100.0] {
-            assert!(filter.eval(x).abs() < 1e-7, "{plugin}({x})");
-        }
-        assert!(filter.eval(0.0) > 0.8, "{plugin}");
-    }
-}
-
 #[test]
 fn interpolating_filters_vanish_at_other_pixels() {
     for plugin in ["catmullrom", "lanczos", "tent"] {

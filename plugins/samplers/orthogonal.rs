@@ -102,15 +102,15 @@ struct Row {
 }
 
 impl Points {
-    /// The row for a sample in the array that holds a dimension, and the number of the dimension in it.
+    /// The row for a sample in the array that holds a dimension, and the (first) column of the dimension in it.
     fn row(&self, pixel: u64, counted: Counted, sample: u32, dimension: u32) -> (Row, u32) {
-        // Pairs must not be torn apart: an array holds an even number of dimensions, at least two.
-        let held = match counted {
-            Counted::Singles => self.levels,
-            Counted::Pairs => self.levels & !1,
+        // Pairs must not be torn apart: an array holds whole ones, at least one.
+        let (held, columns) = match counted {
+            Counted::Singles => (self.levels, 1),
+            Counted::Pairs => (self.levels / 2, 2),
         };
         let key = dimension_key(pixel, counted, dimension / held);
-        (Row { index: permute(sample % self.count, self.count, key as u32), key }, dimension % held)
+        (Row { index: permute(sample % self.count, self.count, key as u32), key }, dimension % held * columns)
     }
 
     /// The value of a row in a column: its digits taken as a polynomial, evaluated at the column's number.
@@ -148,7 +148,7 @@ impl PointSet for Points {
     fn pairs(&self, pixel: UVec2, sample: u32, first: u32, out: &mut [Vec2]) {
         let pixel = pixel_key(self.seed, pixel, sample / self.count);
         for (dimension, out) in (first..).zip(out) {
-            let (row, column) = self.row(pixel, Counted::Pairs, sample, 2 * dimension);
+            let (row, column) = self.row(pixel, Counted::Pairs, sample, dimension);
             let [fine_x, fine_y] = if self.strength == 2 {
                 // As in correlated multi-jittering: each coordinate's fine stratum is the other's level.
                 [self.level(row.index, column + 1), self.level(row.index, column)]

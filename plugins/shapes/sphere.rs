@@ -275,6 +275,8 @@ impl Shape for Sphere {
 
     fn pdf_direct(&self, from: Vec3, point: &LightPoint) -> f32 {
         let pdf = match self.view(from) {
+            // Only the near side is sampled; the far one may be seen through it.
+            Some(_) if self.orient(point.n).dot(point.d) > 0.0 => 0.0,
             Some(view) => view.pdf(),
             None => point.distance * point.distance / (self.area() * point.d.dot(point.n).abs()),
         };

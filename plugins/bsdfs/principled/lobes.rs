@@ -226,6 +226,10 @@ impl Bxdf for Surface {
         }
         let (from_front, reflected) = (wi.z > 0.0, side > 0.0);
         let (brdf, bsdf) = self.brdf_bsdf();
+        // Nothing is sampled from behind where there is no glass.
+        if !from_front && bsdf == 0.0 {
+            return NOTHING;
+        }
         let eta = if from_front { self.eta } else { 1.0 / self.eta };
         let Some(h) = (wi + wo * if reflected { 1.0 } else { eta }).try_normalize() else {
             return NOTHING;

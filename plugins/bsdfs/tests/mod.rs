@@ -1,6 +1,5 @@
-//! What holds for all BSDFs.
+//! Tests of several BSDFs together.
 
-mod chi2;
 mod golden;
 mod limits;
 

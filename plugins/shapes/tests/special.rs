@@ -52,24 +52,6 @@ fn points_are_found_by_their_coordinates() {
     }
 }
 
-/// The change of the point with u and v, against differences of the lookup.
-#[test]
-fn derivatives_are_those_of_the_parametrisation() {
-    for plugin in ["rectangle", "disk", "sphere", "cylinder"] {
-        let shape = shape(&draft(plugin));
-        let (uv, h) = (Vec2::new(0.37, 0.61), 1e-3);
-        let hit = shape.at_uv(uv).expect("a point");
-        for (axis, derivative) in [(Vec2::X, hit.dp_du), (Vec2::Y, hit.dp_dv)] {
-            let at = |step: f32| shape.at_uv(uv + axis * step).expect("a point").p;
-            let difference = (at(h) - at(-h)) / (2.0 * h);
-            assert!(
-                (difference - derivative).length() < 1e-3 * derivative.length(),
-                "{plugin}: {difference} {derivative}"
-            );
-        }
-    }
-}
-
 #[test]
 fn vertex_attributes_are_interpolated() {
     let traced = Traced::new(shape(&draft("ply").string("filename", "bumpy.ply")));
