@@ -26,10 +26,10 @@ static MEMORY: PeakAlloc = PeakAlloc;
 static ALONE: Mutex<()> = Mutex::new(());
 
 /// Damaged versions of the seeds of each target, shared out among them.
-const VERSIONS: usize = 6000;
+const VERSIONS: usize = 20_000;
 
 /// A scene takes longer than a small file.
-const SCENE_VERSIONS: usize = 2000;
+const SCENE_VERSIONS: usize = 5000;
 
 /// What a reader may take beyond the size of the file.
 const MOST_BYTES: usize = 256 << 20;

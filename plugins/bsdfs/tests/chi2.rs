@@ -13,6 +13,7 @@ use lucerna_core::interfaces::{Arena, Transport};
 use lucerna_core::math::{Vec2, Vec3};
 use lucerna_core::sampling::Pcg32;
 use lucerna_core::stats::chi2::{Chi2, SphereGrid, sidak};
+use lucerna_core::stats::figures::measured;
 use rayon::prelude::*;
 
 const SAMPLES: usize = 100_000;
@@ -92,7 +93,7 @@ fn test(lines: &str, cos_theta: f32, mode: Transport, grid: SphereGrid) -> Chi2 
 }
 
 #[test]
-fn samples_follow_their_density() {
+fn hc_s01_s11_samples_follow_their_density() {
     let mut tests = Vec::new();
     for (lines, from_below) in subjects() {
         let below: &[f32] = if from_below { &[-0.6] } else { &[] };
@@ -108,6 +109,7 @@ fn samples_follow_their_density() {
         }
     }
     let level = sidak(0.01, tests.len());
+    measured("hc_s01_s11_samples_follow_their_density", format!("{} tests pass", tests.len()));
     let failures: Vec<String> = tests
         .par_iter()
         .filter_map(|(lines, cos_theta, mode)| {
@@ -120,7 +122,7 @@ fn samples_follow_their_density() {
 
 /// Extreme anisotropy, on cells four times as fine.
 #[test]
-fn extreme_anisotropy() {
+fn hc_s14_extreme_anisotropy() {
     let grid = SphereGrid { rings: 80, spokes: 160 };
     let tests = [("beckmann", 0.5), ("ggx", 0.5), ("beckmann", 1.0), ("ggx", 1.0)];
     let failures: Vec<String> = tests
