@@ -9,7 +9,7 @@ line of a Markdown table: ratio of the image means (ours over the reference's) w
 share of 8x8 tiles whose means agree at 1 % (Welch's t-test; with a Sidak bound the worst tile), and both times.
 --scene renders another file (say, the original of an old scene) with Lucerna against the same reference.
 --reference-offsets lets Lucerna's rays start as far off surfaces as the reference's do, (1 + max|p|) 8.9e-5 scene
-units: what agrees only then differs by light that leaks through gaps of that size in the reference.
+units, and pass where shading normals are tilted: what agrees only then differs by light that leaks so in the reference.
 The exit code is 1 if a mean differs by more than 0.5 % and 3 standard errors, or a tile beyond the Sidak bound.
 """
 import argparse

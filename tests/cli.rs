@@ -145,7 +145,7 @@ fn a_crop_is_a_window_of_the_whole() {
 }
 
 #[test]
-fn a_replayed_sample_is_that_of_the_run() {
+fn hc_x08_a_replayed_sample_is_that_of_the_run() {
     let whole = cornell("replay", "whole.exr", &["--spp", "1", "--seed", "5"]).image;
     for (x, y) in [(3, 4), (8, 0), (15, 15)] {
         let pixel = format!("{x},{y}");

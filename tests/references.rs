@@ -39,8 +39,11 @@ const APART: &[(&str, &str)] = &[
     ),
 ];
 
-/// Scenes that are only the reference's when rays start as far off surfaces as its do: 9 cm, 1000 units from the origin.
-const FAR: &str = "shapes/far_from_origin";
+/// Scenes that are only the reference's when rays leave surfaces as its do, and why.
+const REFERENCE_RAYS: &[(&str, &str)] = &[
+    ("shapes/far_from_origin", "rays start 9 cm off surfaces there, 1000 units from the origin"),
+    ("shapes/ply_binary", "light passes the open vase where shading normals tilt: 0.07 % of all, 1 % of the vase"),
+];
 
 /// The reference numbers shapes in an order that changes from run to run.
 const SHAPE_NUMBER: &str = "shape.I";
@@ -134,7 +137,7 @@ struct Verdict {
 
 fn compare(entry: &Entry, spp: u32, seed: u32) -> Result<Verdict, String> {
     let mut scene = load_entry(entry);
-    if entry.name == FAR {
+    if REFERENCE_RAYS.iter().any(|(name, _)| *name == entry.name) {
         scene.use_reference_offsets();
     }
     let reference = read_exr(&format!("reference/images/{}.exr", entry.name));

@@ -1,8 +1,10 @@
 //! Whatever a file holds: an error or a picture, never a panic.
 //!
 //! All test scenes are damaged in many ways, deterministically, and taken the whole way: read, resolved, upgraded, built,
-//! and rendered with one sample per pixel if they still can be. The readers of meshes and pictures have closer tests of
-//! this kind beside them; here damaged files meet the objects that use them.
+//! and rendered with one sample per pixel if they still can be. `fuzz_corpus.rs` has closer tests of this kind for the
+//! readers of meshes and pictures; here damaged files meet the objects that use them.
+
+mod support;
 
 use lucerna::core::render::{Budget, Control, RenderContext};
 use lucerna::core::scene::xml::{LoadOptions, load_str};
@@ -12,6 +14,7 @@ use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, Once};
+use support::damage::{Random, damage_bytes, damage_scene};
 
 /// Damaged versions of each scene.
 const VERSIONS: usize = 100;
@@ -20,136 +23,6 @@ const FILE_VERSIONS: usize = 300;
 /// Most pixels per side and most bounces: the question is whether it renders, not what.
 const SIDE: i64 = 4;
 const BOUNCES: i64 = 8;
-
-/// Numbers at the edges of what types can hold and what makes sense.
-const NUMBERS: &[&str] = &[
-    "nan",
-    "0.1",
-    "0.9",
-    "1e-3",
-    "3",
-    "100",
-    "",
-    "x",
-    "0",
-    "-0",
-    "-1",
-    "1",
-    "2",
-    "0.5",
-    "1e-45",
-    "1e-38",
-    "1e-20",
-    "-1e-20",
-    "1e20",
-    "1e38",
-    "-1e38",
-    "3.4e38",
-    "1e39",
-    "1e308",
-    "7",
-    "360",
-    "65536",
-    "65537",
-    "2147483647",
-    "-2147483648",
-    "4294967296",
-    "9223372036854775807",
-    "0, 0, 0",
-    "1e30, 1, 1",
-    "0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0",
-    "400:1, 500:1e38",
-    "true",
-];
-
-/// A small deterministic generator (Steele, Lea, Flood 2014, "Fast splittable pseudorandom number generators").
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, end: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) % end.max(1) as u64) as usize
-    }
-
-    fn pick<'a, T: ?Sized>(&mut self, list: &[&'a T]) -> &'a T {
-        list[self.below(list.len())]
-    }
-}
-
-/// The quoted values of `text` that stand behind `before`, as byte ranges.
-fn values(text: &str, before: &str) -> Vec<std::ops::Range<usize>> {
-    let opening = format!("{before}\"");
-    let starts = text.match_indices(&opening).map(|(at, _)| at + opening.len());
-    starts.filter_map(|start| text[start..].find('"').map(|length| start..start + length)).collect()
-}
-
-/// Damages a scene in one way.
-fn damage_text(text: &mut String, registry: &Registry, random: &mut Random) {
-    match random.below(10) {
-        // Most often a single number: what gets past the parser reaches deepest.
-        0..=4 => {
-            let places = [values(text, "value="), values(text, "x="), values(text, "y=")].concat();
-            if let Some(place) = places.get(random.below(places.len())) {
-                text.replace_range(place.clone(), random.pick(NUMBERS));
-            }
-        }
-        5 => {
-            let places = values(text, "type=");
-            let plugins: Vec<&str> = registry.all().map(|plugin| plugin.name).collect();
-            if let Some(place) = places.get(random.below(places.len())) {
-                text.replace_range(place.clone(), random.pick(&plugins));
-            }
-        }
-        6 => {
-            let places = values(text, "=");
-            let (a, b) = (random.below(places.len()), random.below(places.len()));
-            if a < b {
-                let later = text[places[b].clone()].to_owned();
-                let earlier = text[places[a].clone()].to_owned();
-                text.replace_range(places[b].clone(), &earlier);
-                text.replace_range(places[a].clone(), &later);
-            }
-        }
-        7 | 8 => {
-            let mut lines: Vec<&str> = text.lines().collect();
-            let (from, to) = (random.below(lines.len()), random.below(lines.len()));
-            let Some(&line) = lines.get(from) else { return };
-            match random.below(3) {
-                0 => drop(lines.remove(from)),
-                1 => lines.insert(to, line),
-                _ => lines.swap(from, to),
-            }
-            *text = lines.join("\n");
-        }
-        _ => {
-            let mut bytes = std::mem::take(text).into_bytes();
-            damage_bytes(&mut bytes, random);
-            *text = String::from_utf8_lossy(&bytes).into_owned();
-        }
-    }
-}
-
-/// Damages a file in one way.
-fn damage_bytes(bytes: &mut Vec<u8>, random: &mut Random) {
-    let at = random.below(bytes.len());
-    match random.below(5) {
-        0 => bytes.truncate(at),
-        1 | 2 => {
-            if let Some(byte) = bytes.get_mut(at) {
-                *byte ^= 1 << random.below(8);
-            }
-        }
-        3 => {
-            let extremes = [f32::NAN, f32::INFINITY, -1e38, 3.4e38, 1e-45, 0.0, -1.0];
-            let value = extremes[random.below(extremes.len())].to_le_bytes();
-            bytes.iter_mut().skip(at).zip(value).for_each(|(byte, new)| *byte = new);
-        }
-        _ => drop(bytes.drain(at..bytes.len().min(at + 1 + random.below(16)))),
-    }
-}
 
 /// Makes what is rendered small. Nothing that could be an error is repaired.
 fn shrink(description: &mut Description) {
@@ -252,13 +125,14 @@ fn scenes() -> Vec<(PathBuf, String)> {
 #[test]
 fn damaged_scenes_never_panic() {
     let registry = lucerna::builtin();
+    let plugins: Vec<&str> = registry.all().map(|plugin| plugin.name).collect();
     let scenes = scenes();
     let (mut rendered, mut panics) = (0, Vec::new());
     for (number, (path, original)) in scenes.iter().enumerate() {
         for version in 0..VERSIONS {
             let mut random = Random((number * VERSIONS + version) as u64);
             let mut text = original.clone();
-            (0..=version % 2).for_each(|_| damage_text(&mut text, &registry, &mut random));
+            (0..=version % 2).for_each(|_| damage_scene(&mut text, &plugins, &mut random));
             let folder = path.parent().unwrap();
             let panic = panic_of(|| rendered += usize::from(render(&text, folder, &registry, version % 4 == 0)));
             panics.extend(panic.map(|said| format!("{} version {version}: {said}", path.display())));

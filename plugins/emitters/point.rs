@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn at_the_reference_point_there_is_no_light() {
+    fn hc_e05_at_the_reference_point_there_is_no_light() {
         let light = testing::emitter("point", vec![]).unwrap();
         assert!(light.sample_direct(Vec3::ZERO, Vec2::ZERO).is_none());
         assert!(light.sample_direct(Vec3::splat(1e-30), Vec2::ZERO).is_none());

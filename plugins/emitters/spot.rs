@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn odd_cones() {
+    fn hc_e04_odd_cones() {
         assert!(testing::errors("spot", vec![float("cutoff_angle", 0.0)]).contains("cutoff_angle"));
         let mut rng = Pcg32::new(3, 1);
         for (cutoff, beam) in [(30.0, 30.0), (90.0, 67.5), (180.0, 135.0), (180.0, 180.0), (20.0, 25.0)] {

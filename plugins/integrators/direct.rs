@@ -103,9 +103,10 @@ impl RadianceEstimator for Direct {
         if bsdf.lobes().is_smooth() {
             for _ in 0..self.emitter_samples {
                 let Some((_, light)) = scene.sample_emitter(hit.p, stream.next_2d()) else { continue };
-                let (value, pdf) = bxdf.eval_pdf(hit.wi, hit.to_local(light.point.d), Transport::Radiance);
+                let wo = hit.to_local(light.point.d);
+                let (value, pdf) = bxdf.eval_pdf(hit.wi, wo, Transport::Radiance);
                 let contribution = value * light.weight;
-                if contribution.is_black() {
+                if contribution.is_black() || !scene.keeps_sides(&hit, wo) {
                     continue;
                 }
                 found.rays += 1;
@@ -119,7 +120,8 @@ impl RadianceEstimator for Direct {
 
         for _ in 0..self.bsdf_samples {
             let (u1, u2) = pair_before_single(stream);
-            let Some(sample) = bxdf.sample(hit.wi, u1, u2, Transport::Radiance) else { continue };
+            let sample = bxdf.sample(hit.wi, u1, u2, Transport::Radiance);
+            let Some(sample) = sample.filter(|sample| scene.keeps_sides(&hit, sample.wo)) else { continue };
             let d = hit.to_world(sample.wo);
             let next = hit.leave(d);
             found.rays += 1;

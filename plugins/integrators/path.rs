@@ -103,7 +103,7 @@ impl RadianceEstimator for Path {
             let sample = bxdf.sample(hit.wi, u1, u2, Transport::Radiance);
             // Drawn at every vertex, needed or not: the numbers of the next sample depend on it in the reference's order.
             let u_roulette = stream.next_1d();
-            let Some(sample) = sample else {
+            let Some(sample) = sample.filter(|sample| scene.keeps_sides(&hit, sample.wo)) else {
                 found.alpha = 1.0;
                 break;
             };
@@ -138,9 +138,10 @@ impl RadianceEstimator for Path {
 /// Light of one emitter sample scattered at a hit, weighted against BSDF sampling.
 #[inline]
 fn direct_light(scene: &Scene, hit: &SurfaceHit, bxdf: &dyn Bxdf, light: &LightSample, rays: &mut u32) -> Rgb {
-    let (value, pdf) = bxdf.eval_pdf(hit.wi, hit.to_local(light.point.d), Transport::Radiance);
+    let wo = hit.to_local(light.point.d);
+    let (value, pdf) = bxdf.eval_pdf(hit.wi, wo, Transport::Radiance);
     let contribution = value * light.weight;
-    if contribution.is_black() {
+    if contribution.is_black() || !scene.keeps_sides(hit, wo) {
         return Rgb::BLACK;
     }
     *rays += 1;

@@ -138,16 +138,18 @@ impl RadianceEstimator for VolPath {
                 && bsdf.lobes().is_smooth()
                 && let Some((_, light)) = scene.sample_emitter(hit.p, stream.next_2d())
             {
-                let (value, pdf) = bxdf.eval_pdf(hit.wi, hit.to_local(light.point.d), Transport::Radiance);
+                let wo = hit.to_local(light.point.d);
+                let (value, pdf) = bxdf.eval_pdf(hit.wi, wo, Transport::Radiance);
                 let mut contribution = value * light.weight;
-                if !contribution.is_black() {
+                if !contribution.is_black() && scene.keeps_sides(&hit, wo) {
                     contribution *= transmittance(scene, &hit, &light, &mut found.rays);
                     found.rgb +=
                         throughput * contribution * if light.delta { 1.0 } else { self.variant.weight(light.pdf, pdf) };
                 }
             }
             let (u1, u2) = pair_before_single(stream);
-            let Some(sample) = bxdf.sample(hit.wi, u1, u2, Transport::Radiance) else {
+            let sample = bxdf.sample(hit.wi, u1, u2, Transport::Radiance);
+            let Some(sample) = sample.filter(|sample| scene.keeps_sides(&hit, sample.wo)) else {
                 found.alpha = 1.0;
                 break;
             };

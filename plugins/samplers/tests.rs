@@ -50,7 +50,7 @@ fn one_in_each(values: impl Iterator<Item = f32>, strata: u32) -> bool {
 }
 
 #[test]
-fn counts_are_rounded_as_documented() {
+fn hc_x04_counts_are_rounded_as_documented() {
     let rounded = |plugin: &str, count: i64| {
         sampler(&Draft::new(ObjectKind::Sampler, plugin).int("sample_count", count)).sample_count()
     };

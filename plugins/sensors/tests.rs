@@ -87,7 +87,7 @@ fn rays_as_the_reference() {
 }
 
 #[test]
-fn extreme_angles_are_finite() {
+fn hc_e08_extreme_angles_are_finite() {
     for fov in [0.001, 179.9] {
         let sensor = sensor(draft("perspective", (64, 64)).float("fov", fov));
         for film in [Vec2::ZERO, Vec2::splat(0.5), Vec2::splat(0.999_999)] {
@@ -107,7 +107,7 @@ fn a_closed_aperture_is_a_pinhole() {
 }
 
 #[test]
-fn senseless_cameras_are_refused() {
+fn hc_e08_senseless_cameras_are_refused() {
     let camera = || draft("perspective", (4, 4));
     assert!(camera().float("fov", 0.0).errors().contains("fov"));
     assert!(camera().float("fov", 180.0).errors().contains("fov"));

@@ -15,6 +15,8 @@ pub struct Mesh {
     positions: Vec<Vec3>,
     /// Unit shading normals; empty where the mesh is shaded flat.
     normals: Vec<Vec3>,
+    /// The side of most triangles that the shading normals are on: 1 for that of the winding, -1 for the other.
+    facing: f32,
     uvs: Vec<Vec2>,
     triangles: Vec<[u32; 3]>,
     attributes: Vec<MeshAttribute>,
@@ -85,10 +87,12 @@ impl Mesh {
         }
         let corners = |t: &[u32; 3]| t.map(|i| positions[i as usize]);
         let area = triangles.iter().map(|t| 0.5 * area_normal(corners(t)).length()).sum::<f64>() as f32;
+        let facing = facing(&positions, &normals, &triangles);
         Ok(Mesh {
             bounds: Aabb::of_points(triangles.iter().flat_map(corners)),
             positions,
             normals,
+            facing,
             uvs,
             triangles,
             attributes,
@@ -127,13 +131,16 @@ impl Mesh {
         if dp_du.is_finite() && dp_dv.is_finite() { (dp_du, dp_dv) } else { coordinate_system(n) }
     }
 
-    /// Interpolated unit normal; the geometric one where there is none to interpolate.
+    /// Interpolated unit normal; the geometric one where there is none to interpolate, or where it is on the other side
+    /// than those of most of the mesh.
     fn shading_normal(&self, corner: &Corner, n: Vec3) -> Vec3 {
         if self.normals.is_empty() {
             return n;
         }
         let [n0, n1, n2] = corner.indices.map(|i| self.normals[i]);
-        (n0 * corner.b[0] + n1 * corner.b[1] + n2 * corner.b[2]).try_normalize().unwrap_or(n)
+        let n = n * self.facing;
+        let interpolated = n0 * corner.b[0] + n1 * corner.b[1] + n2 * corner.b[2];
+        interpolated.try_normalize().filter(|shading| shading.dot(n) > 0.0).unwrap_or(n)
     }
 
     #[inline(always)]
@@ -245,6 +252,16 @@ pub fn flip_v(mesh: &mut TriangleMesh) {
     for uv in &mut mesh.uvs {
         uv.y = 1.0 - uv.y;
     }
+}
+
+/// The side on which most of the shading normals are, by area. Files with all triangles wound the wrong way are common,
+/// and their normals must be believed; a few that disagree with the others must not.
+fn facing(positions: &[Vec3], normals: &[Vec3], triangles: &[[u32; 3]]) -> f32 {
+    let agreement = |t: &[u32; 3]| {
+        let sum: DVec3 = t.iter().filter_map(|&i| normals.get(i as usize)).map(|n| n.as_dvec3()).sum();
+        area_normal(t.map(|i| positions[i as usize])).dot(sum)
+    };
+    if triangles.iter().map(agreement).sum::<f64>() < 0.0 { -1.0 } else { 1.0 }
 }
 
 /// Takes vertices to world space in double precision; normals by the inverse transpose.

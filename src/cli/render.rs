@@ -167,6 +167,16 @@ fn tell_rounding(arguments: &Arguments, budget: Budget) {
     }
 }
 
+/// What the run takes, before it starts.
+fn tell_size(size: UVec2, budget: Budget, bytes: u64) {
+    let work = match budget {
+        Budget::Samples(spp) => format!("{spp} samples each"),
+        Budget::Seconds(seconds) => format!("{seconds} s"),
+    };
+    let mib = bytes as f64 / f64::from(1 << 20);
+    eprintln!("{} x {} pixels, {work}; the sums of the picture take {mib:.1} MiB", size.x, size.y);
+}
+
 /// A scene may be read without a sensor or an integrator, but not rendered.
 fn check_complete(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
     let name = arguments.scene.name();
@@ -229,6 +239,13 @@ fn render(
         let name = arguments.scene.name();
         let message = format!("{name}: the picture needs {needed} MiB, the limit is {} MiB", arguments.max_memory);
         return Err(Failure::new(format!("{message} (raise it with --max-memory, or render a part with --crop)")));
+    }
+    if !arguments.quiet && arguments.pixel.is_none() {
+        tell_size(window.1, budget, FilmStore::bytes(window.1, integrator.aov_names().len()));
+        let flat = scene.accel().stats().degenerate;
+        if flat > 0 {
+            eprintln!("note: {flat} primitives have no area and are left out");
+        }
     }
     let mut cx =
         RenderContext::of_window(scene, camera, window, budget, arguments.seed, control, integrator.aov_names());

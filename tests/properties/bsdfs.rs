@@ -72,7 +72,7 @@ fn chi_square(bxdf: &dyn Bxdf, wi: Vec3, mode: Transport, grid: SphereGrid, fact
 }
 
 #[test]
-fn samples_follow_their_density() {
+fn hc_s01_s11_s14_samples_follow_their_density() {
     let materials = materials();
     let mut cases = Vec::new();
     for material in &materials {
@@ -170,7 +170,7 @@ fn disagreement(bxdf: &dyn Bxdf, wi: Vec3, seed: u64) -> Option<String> {
 }
 
 #[test]
-fn weight_times_density_is_the_value() {
+fn hc_s02_weight_times_density_is_the_value() {
     let failures: Vec<String> = materials()
         .par_iter()
         .flat_map_iter(|material| {

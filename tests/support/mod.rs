@@ -1,6 +1,8 @@
 //! What tests that render share: scenes, renders in memory, references and their manifest.
 #![allow(dead_code)] // Each test binary uses its part.
 
+pub mod damage;
+
 use lucerna::core::image::{Image, ReadLimits, exr};
 use lucerna::core::interfaces::Rfilter;
 use lucerna::core::render::{Budget, Control, RenderContext, Report, SampleOrder};
@@ -71,6 +73,15 @@ pub fn load(path: &Path, defines: &[(String, String)], change: impl FnOnce(&mut 
     change(&mut description);
     let built = instantiate(&lucerna::builtin(), description, false);
     built.unwrap_or_else(|e| panic!("{}: {e}", path.display())).scene
+}
+
+/// Builds a scene from text; the files it names are looked for in `folder`.
+pub fn load_text(text: &str, folder: &Path) -> Scene {
+    let options = xml::LoadOptions { search_path: vec![folder.to_owned()], ..xml::LoadOptions::default() };
+    let mut description = xml::load_str(text, "scene.xml", &options).unwrap_or_else(|e| panic!("{e}"));
+    resolve::resolve(&mut description).unwrap_or_else(|e| panic!("{e}"));
+    upgrade::upgrade(&mut description);
+    instantiate(&lucerna::builtin(), description, false).unwrap_or_else(|e| panic!("{e}")).scene
 }
 
 /// The scene of a manifest entry, at the entry's size.

@@ -17,7 +17,7 @@ fn close(a: f32, b: f32, relative: f32) -> bool {
 }
 
 #[test]
-fn equal_indices_pass_light_unchanged() {
+fn hc_s07_equal_indices_pass_light_unchanged() {
     let wi = direction(0.3);
     with("bsdf|dielectric;float|int_ior|1.4;float|ext_ior|1.4", wi, |bxdf| {
         for u1 in [0.0, 0.5, ONE_MINUS_EPSILON] {
@@ -28,7 +28,7 @@ fn equal_indices_pass_light_unchanged() {
 }
 
 #[test]
-fn combinators_at_their_ends() {
+fn hc_s11_s12_s13_combinators_at_their_ends() {
     let mut pcg = Pcg32::new(5, 1);
     let same = |a: &str, b: &str, pcg: &mut Pcg32| {
         for cos_theta in [0.8, 0.05, -0.7] {
@@ -80,7 +80,7 @@ fn textured_parameters() {
 }
 
 #[test]
-fn bad_parameters_are_errors() {
+fn hc_s06_s07_s12_bad_parameters_are_errors() {
     for (lines, part) in [
         ("bsdf|twosided;bsdf|dielectric", "without a transmission component"),
         ("bsdf|twosided;bsdf|mask;bsdf|diffuse", "allow_transmission"),

@@ -92,7 +92,7 @@ fn positions_are_sampled_as_the_reference() {
 }
 
 #[test]
-fn any_texture_coordinate_gives_a_finite_value() {
+fn hc_e07_any_texture_coordinate_gives_a_finite_value() {
     let odd = [0.0, 1.0, -0.5, 1e7, -1e7, 8.4e6, f32::MAX, f32::INFINITY, f32::NAN];
     for (width, height) in [(1, 1), (65536, 1), (3, 5)] {
         for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
@@ -120,7 +120,7 @@ fn precision_follows_the_file() {
 }
 
 #[test]
-fn what_is_not_finite_is_told_with_its_pixel() {
+fn hc_s10_what_is_not_finite_is_told_with_its_pixel() {
     let mut values = testing::pattern(4, 3, 3);
     values[(4 + 2) * 3 + 1] = f32::NAN;
     let message = Texels::new(floats(4, 3, 3, values), false, Format::Auto).err().unwrap();

@@ -156,10 +156,13 @@ impl Accel {
             frame,
             bounds: total,
         };
+        // Collected in place of larger entries.
+        tree.primitives.shrink_to_fit();
         if !binary.nodes.is_empty() {
             let wide = collapse::collapse(&binary, &frame, &|prim| prim.checked_sub(triangle_count));
             drop(binary);
             tree.nodes = wide.nodes;
+            tree.nodes.shrink_to_fit();
             tree.root = Some(wide.root);
             let fill = |members: &[u32; wide::WIDTH]| {
                 let mut pack = Pack::EMPTY;

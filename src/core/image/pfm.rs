@@ -67,7 +67,6 @@ fn encode(image: &Image) -> Result<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::damage::for_each_damaged;
 
     fn sample(channels: &[&str]) -> Image {
         let mut image = Image::new(3, 2, channels);
@@ -88,13 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn damaged_files_are_survived() {
-        let valid = encode(&sample(&["R", "G", "B"])).unwrap();
-        let mut errors = 0;
-        for_each_damaged(&valid, 3000, |bytes| {
-            errors += usize::from(read(bytes, &ReadLimits::default()).is_err());
-        });
-        assert!(errors > 500, "{errors}");
+    fn sizes_are_held_against_the_file() {
         let huge = read(b"PF\n60000 60000\n-1\nabc", &ReadLimits::default()).unwrap_err();
         assert!(huge.message.contains("need 43200000000 bytes"), "{huge}");
         assert!(read(b"PF\n4 4\n-1\nabc", &ReadLimits::default()).unwrap_err().message.contains("ends before"));

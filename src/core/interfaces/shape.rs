@@ -2,7 +2,7 @@
 
 use super::{LightPoint, SurfaceHit};
 use crate::accel::{Geometry, Hit, Ray};
-use crate::math::{Aabb, Transform, Vec2, Vec3};
+use crate::math::{Aabb, Mat4, Vec2, Vec3};
 use crate::scene::ShapeGroup;
 use std::sync::Arc;
 
@@ -90,8 +90,8 @@ pub trait Shape: Send + Sync {
         None
     }
 
-    /// Group and placement, if this shape is an instance.
-    fn instance(&self) -> Option<(&ShapeGroup, &Transform)> {
+    /// The group and the matrix that takes it to the world, if this shape is an instance.
+    fn instance(&self) -> Option<(&ShapeGroup, &Mat4)> {
         None
     }
 }

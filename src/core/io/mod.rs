@@ -66,6 +66,3 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
     }
     std::fs::read(path).map_err(failed)
 }
-
-#[cfg(test)]
-pub(crate) mod damage;

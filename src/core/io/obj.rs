@@ -254,7 +254,6 @@ impl SharedVertices {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::damage::for_each_damaged;
 
     const CORNERS: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 5\n";
     const FULL: &str = "# a comment\nmtllib x.mtl\no thing\nv 0 0 0\nv 1 0 0 1\nv 1 1 0 0.5 0.5 0.5\nv 0 1 -1.5e0\n\
@@ -356,13 +355,6 @@ mod tests {
         assert_eq!(error("v 0 0\n"), "line 1: 3 numbers are expected");
         assert_eq!(error(""), "the mesh has no vertices");
         assert_eq!(error(CORNERS), "the mesh has no faces with three corners or more");
-    }
-
-    #[test]
-    fn damaged_files_are_survived() {
-        let mut errors = 0;
-        for_each_damaged(FULL.as_bytes(), 5000, |bytes| errors += usize::from(read(bytes).is_err()));
-        assert!(errors > 1000, "{errors}");
     }
 
     /// Positions, normals and texture coordinates of all corners, in order, as `tobj` sees them.

@@ -213,7 +213,6 @@ mod tests {
     use flate2::{Compression, write::ZlibEncoder};
 
     use super::*;
-    use crate::io::damage::for_each_damaged;
 
     fn content(version: u16, flags: u32, counts: [u64; 2], indices: &[u32]) -> Vec<u8> {
         let mut bytes = flags.to_le_bytes().to_vec();
@@ -318,19 +317,5 @@ mod tests {
         bomb.extend(0u64.to_le_bytes());
         bomb.resize(120_000_000, 0);
         assert!(error(bomb).contains("declares 10000000 vertices"));
-    }
-
-    #[test]
-    fn damaged_files_are_survived() {
-        let mut errors = 0;
-        for version in [3, 4] {
-            let valid = file(version, &[triangle(version, SINGLE | NORMALS), triangle(version, DOUBLE | UVS)]);
-            for_each_damaged(&valid, 2000, |bytes| errors += usize::from(read(bytes, 1).is_err()));
-        }
-        assert!(errors > 2000, "{errors}");
-        // Damage behind the compression.
-        for_each_damaged(&triangle(4, SINGLE | NORMALS), 1000, |content| {
-            errors += usize::from(read(&file(4, &[content.to_vec()]), 0).is_err());
-        });
     }
 }

@@ -161,3 +161,43 @@ impl TileStore {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stats::figures::measured;
+
+    struct Pixel;
+
+    impl Rfilter for Pixel {
+        fn radius(&self) -> f32 {
+            0.5
+        }
+
+        fn eval(&self, _x: f32) -> f32 {
+            1.0
+        }
+
+        fn is_box(&self) -> bool {
+            true
+        }
+    }
+
+    /// A million samples of a number that has no end in binary, as a tile adds them and as passes do.
+    #[test]
+    fn hc_x06_a_million_samples_do_not_drift() {
+        let window = Window { min: IVec2::ZERO, size: UVec2::ONE };
+        let value = Radiance { rgb: Rgb::new(0.1, 1e-6, 12345.678), alpha: 1.0, rays: 0 };
+        let mut film = FilmStore::new(UVec2::ONE, Vec::new());
+        for _ in 0..1000 {
+            let mut tile = TileStore::new(window, &Pixel, 0);
+            (0..1000).for_each(|_| tile.splat(&Pixel, IVec2::ZERO, Vec2::splat(0.5), value, &[]));
+            film.add_tile(&tile);
+        }
+        let sums = [value.rgb.r, value.rgb.g, value.rgb.b].map(|v| f64::from(v) * 1e6);
+        let drift = (0..3).map(|i| (film.sums[i] / sums[i] - 1.0).abs()).fold(0.0, f64::max);
+        measured("hc_x06_a_million_samples_do_not_drift", format!("relative drift {drift:.0e}"));
+        assert!(drift < 1e-9, "{drift}");
+        assert_eq!(film.pixel(0, 0).rgb, value.rgb);
+    }
+}

@@ -90,17 +90,29 @@ pub fn trace_reads(registry: &Registry, description: &Description) -> Result<Rea
     Ok(trace.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner))
 }
 
-/// Adds what a scene may leave out: materials of shapes, film and sampler of sensors, the filter of films.
+/// Adds what a scene may leave out: materials of shapes, film and sampler of sensors, the filter of films. Shapes
+/// share their default materials, for there may be millions of shapes.
 fn add_defaults(description: &mut Description) {
+    let (mut of_lamps, mut of_others) = (None, None);
     let mut index = 0;
     while index < description.nodes.len() {
         let id = NodeId(index as u32);
         match description.node(id).kind {
             ObjectKind::Shape if !has_child(description, id, ObjectKind::Bsdf) => {
                 // A lamp reflects nothing unless it says so.
-                let reflectance = if has_child(description, id, ObjectKind::Emitter) { 0.0 } else { 0.5 };
-                let parameter = |at| Parameter { name: "reflectance".to_owned(), value: Value::Float(reflectance), at };
-                add_child(description, id, ObjectKind::Bsdf, "diffuse", parameter);
+                let is_lamp = has_child(description, id, ObjectKind::Emitter);
+                let (shared, reflectance) = if is_lamp { (&mut of_lamps, 0.0) } else { (&mut of_others, 0.5) };
+                match *shared {
+                    Some(material) => attach(description, id, ObjectKind::Bsdf, material),
+                    None => {
+                        let material = add_plain_child(description, id, ObjectKind::Bsdf, "diffuse");
+                        let at = description.node(id).at.clone();
+                        let value = Value::Float(reflectance);
+                        let parameter = Parameter { name: "reflectance".to_owned(), value, at };
+                        description.node_mut(material).parameters.push(parameter);
+                        *shared = Some(material);
+                    }
+                }
             }
             ObjectKind::Sensor => {
                 for (kind, plugin) in [(ObjectKind::Film, "hdrfilm"), (ObjectKind::Sampler, "sobol")] {
@@ -122,31 +134,24 @@ fn has_child(description: &Description, id: NodeId, kind: ObjectKind) -> bool {
     description.children(id).any(|(_, child)| description.node(child).kind == kind)
 }
 
-fn add_plain_child(description: &mut Description, parent: NodeId, kind: ObjectKind, plugin: &str) {
+fn add_plain_child(description: &mut Description, parent: NodeId, kind: ObjectKind, plugin: &str) -> NodeId {
     let at = description.node(parent).at.clone();
     let child = description.add(Node {
         kind,
         plugin: plugin.to_owned(),
         id: None,
         parameters: Vec::new(),
-        at: at.clone(),
+        at,
         included_from: Vec::new(),
     });
-    let name = format!("_default_{}", kind.tag());
-    description.node_mut(parent).parameters.push(Parameter { name, value: Value::Object(child), at });
+    attach(description, parent, kind, child);
+    child
 }
 
-fn add_child(
-    description: &mut Description,
-    parent: NodeId,
-    kind: ObjectKind,
-    plugin: &str,
-    parameter: impl Fn(super::Location) -> Parameter,
-) {
-    add_plain_child(description, parent, kind, plugin);
-    let child = NodeId(description.nodes.len() as u32 - 1);
-    let at = description.node(child).at.clone();
-    description.node_mut(child).parameters.push(parameter(at));
+fn attach(description: &mut Description, parent: NodeId, kind: ObjectKind, child: NodeId) {
+    let name = format!("_default_{}", kind.tag());
+    let at = description.node(parent).at.clone();
+    description.node_mut(parent).parameters.push(Parameter { name, value: Value::Object(child), at });
 }
 
 /// How building an object ended.
@@ -406,6 +411,7 @@ impl<'a> Builder<'a> {
             EmitterSource::Free(_) => false,
         });
         lights.extend(meshes.into_iter().rev());
+        shapes.shrink_to_fit();
         match Scene::new(shapes, &lights, sensors, integrator) {
             Ok(scene) => Some(scene),
             Err(message) => {

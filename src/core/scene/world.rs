@@ -45,6 +45,32 @@ fn build_accel(shapes: &[BuiltShape]) -> Result<Accel, String> {
     Accel::build(&items, &BuildOptions::default())
 }
 
+/// How an emitter is picked.
+enum LightChoice {
+    /// None gives off light.
+    Nothing,
+    /// All have the same chance.
+    Uniform,
+    /// By weight.
+    Weighted(Discrete),
+}
+
+impl LightChoice {
+    /// By the scene's weights, but never one that gives off no light: a black one, or one without area.
+    fn new(emitters: &[Arc<dyn Emitter>]) -> Result<Self, String> {
+        if !emitters.is_empty() && emitters.iter().all(|e| e.sampling_weight() == 0.0) {
+            return Err("the sampling weights of all emitters are zero".to_owned());
+        }
+        // The power of what surrounds a scene grows with its size; whether it is zero must not depend on that.
+        let weight = |e: &Arc<dyn Emitter>| if e.power(Vec3::ZERO, 1.0) == 0.0 { 0.0 } else { e.sampling_weight() };
+        if !emitters.is_empty() && emitters.iter().all(|e| weight(e) == 1.0) {
+            return Ok(LightChoice::Uniform);
+        }
+        let weighted = Discrete::new(emitters.iter().map(|e| f64::from(weight(e))));
+        Ok(weighted.map_or(LightChoice::Nothing, LightChoice::Weighted))
+    }
+}
+
 /// A scene ready to render. Nothing in it changes any more.
 pub struct Scene {
     shapes: Vec<BuiltShape>,
@@ -57,8 +83,7 @@ pub struct Scene {
     accel: Accel,
     sensors: Vec<BuiltSensor>,
     integrator: Option<Arc<dyn Integrator>>,
-    /// Chance of each emitter where they do not all have the same.
-    light_choice: Option<Discrete>,
+    light_choice: LightChoice,
     /// See [`use_reference_offsets`](Scene::use_reference_offsets).
     reference_offsets: bool,
 }
@@ -96,13 +121,7 @@ impl Scene {
                 }
             }
         }
-        let uniform = emitters.iter().all(|e| e.sampling_weight() == 1.0);
-        let light_choice =
-            if uniform { None } else { Discrete::new(emitters.iter().map(|e| f64::from(e.sampling_weight()))) };
-        if !uniform && light_choice.is_none() {
-            // All weights are zero: no light is ever sampled, as if there were none to choose from.
-            return Err("the sampling weights of all emitters are zero".to_owned());
-        }
+        let light_choice = LightChoice::new(&emitters)?;
         Ok(Scene {
             shapes,
             emitters,
@@ -171,17 +190,32 @@ impl Scene {
         }
     }
 
-    /// Lets rays start as far off surfaces as the reference's do, instead of just outside the rounding error: only for
-    /// comparisons sample for sample. It leaks light through thin gaps, as the reference does.
+    /// Lets rays start as far off surfaces as the reference's do, instead of just outside the rounding error, and lets
+    /// them pass where [`keeps_sides`](Self::keeps_sides) would not: only for comparisons sample for sample. Light leaks
+    /// through thin gaps and tilted normals, as in the reference.
     pub fn use_reference_offsets(&mut self) {
         self.reference_offsets = true;
+    }
+
+    /// Whether light that is scattered into local direction `wo` leaves on the side that its shading frame says: what
+    /// is reflected on the side it came from, what is transmitted on the other. Where shading normals are tilted, light
+    /// would pass through opaque surfaces otherwise.
+    #[inline]
+    pub fn keeps_sides(&self, hit: &SurfaceHit, wo: Vec3) -> bool {
+        if hit.frame.n == hit.n || self.reference_offsets {
+            return true;
+        }
+        let n = hit.to_local(hit.n);
+        (hit.wi.z * wo.z > 0.0) == (hit.wi.dot(n) * wo.dot(n) > 0.0)
     }
 
     #[cold]
     fn instance_surface(&self, ray: &Ray, hit: &Hit, surface: &mut SurfaceHit) {
         let instance = &self.shapes[hit.instance as usize].shape;
         match instance.instance() {
-            Some((group, to_world)) => {
+            Some((group, matrix)) => {
+                // Kept without its inverse, for there may be millions; all that are built have one.
+                let to_world = Transform::new(matrix.as_dmat4()).unwrap_or_default();
                 let local = Ray {
                     o: to_world.inverse_point(ray.o),
                     d: to_world.inverse_vector(ray.d),
@@ -190,7 +224,7 @@ impl Scene {
                     ends: [NO_TRIANGLE; 2],
                 };
                 group.shapes[hit.shape as usize].shape.surface(&local, hit, surface);
-                *surface = transform_hit(surface, to_world);
+                *surface = transform_hit(surface, &to_world);
             }
             None => instance.surface(ray, hit, surface),
         }
@@ -270,8 +304,9 @@ impl Scene {
     #[inline]
     pub fn emitter_pmf(&self, id: EmitterId) -> f32 {
         match &self.light_choice {
-            None => 1.0 / self.emitters.len() as f32,
-            Some(distribution) => distribution.pmf(id.0),
+            LightChoice::Nothing => 0.0,
+            LightChoice::Uniform => 1.0 / self.emitters.len() as f32,
+            LightChoice::Weighted(distribution) => distribution.pmf(id.0),
         }
     }
 
@@ -279,14 +314,14 @@ impl Scene {
     #[inline]
     pub fn choose_emitter(&self, u: f32) -> Option<(EmitterId, f32, f32)> {
         match (&self.light_choice, self.emitters.len()) {
-            (_, 0) => None,
-            (None, 1) => Some((EmitterId(0), 1.0, u)),
-            (None, count) => {
+            (LightChoice::Nothing, _) => None,
+            (LightChoice::Uniform, 1) => Some((EmitterId(0), 1.0, u)),
+            (LightChoice::Uniform, count) => {
                 let scaled = u * count as f32;
                 let index = (scaled as u32).min(count as u32 - 1);
                 Some((EmitterId(index), 1.0 / count as f32, (scaled - index as f32).min(ONE_MINUS_EPSILON)))
             }
-            (Some(distribution), _) => {
+            (LightChoice::Weighted(distribution), _) => {
                 let (index, rest) = distribution.sample_reuse(u);
                 Some((EmitterId(index), distribution.pmf(index), rest))
             }

@@ -1,3 +1,4 @@
 //! Statistics that tests and comparisons rest on.
 
 pub mod chi2;
+pub mod figures;

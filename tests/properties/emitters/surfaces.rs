@@ -67,7 +67,7 @@ type Chart<'a> = &'a dyn Fn(Vec2) -> Option<AreaSample>;
 fn by_coordinates(shape: &dyn Shape, uv: Vec2) -> Option<AreaSample> {
     let hit = shape.at_uv(uv)?;
     let pdf = 1.0 / hit.dp_du.cross(hit.dp_dv).length();
-    Some(AreaSample { p: hit.p, p_error: hit.p_error, n: hit.n, uv, pdf })
+    Some(AreaSample { p: hit.p, p_error: hit.p_error, n: hit.n, uv, pdf, triangle: hit.triangle })
 }
 
 pub fn chi_square(light: &dyn Emitter, shape: &dyn Shape, chart: Chart<'_>, from: Vec3) -> Chi2 {

