@@ -132,11 +132,11 @@ def files_of(scene, defines):
 
 
 def scene_hash(scene, defines):
-    """SHA-256 over the lines `<path relative to the scene> <SHA-256 of the file>\\n`, scene first."""
+    """SHA-256 over the sorted lines `<path relative to the scene> <SHA-256 of the file>\\n`."""
     total = hashlib.sha256()
-    for file in files_of(scene, defines):
-        digest = hashlib.sha256(file.read_bytes()).hexdigest()
-        total.update(f"{os.path.relpath(file, scene.resolve().parent)} {digest}\n".encode())
+    folder = scene.resolve().parent
+    for name, file in sorted((os.path.relpath(file, folder), file) for file in files_of(scene, defines)):
+        total.update(f"{name} {hashlib.sha256(file.read_bytes()).hexdigest()}\n".encode())
     return total.hexdigest()
 
 

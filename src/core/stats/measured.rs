@@ -64,6 +64,27 @@ impl Measured {
         f64::from(self.passes - 1)
     }
 
+    /// Standard error of the mean of the picture over that mean, in the channel where it is largest (those with less than
+    /// a hundredth of the brightest one's energy aside). Neighbouring tiles count as independent, which under a wide
+    /// filter makes it a little too small.
+    pub fn relative_error_of_mean(&self, independent: bool) -> f64 {
+        let Some(variances) = self.tile_variances(independent) else { return 0.0 };
+        let (channels, counts) = (self.channels.len(), tile_counts(self.size));
+        let total: f64 = counts.iter().sum();
+        let means = self.tile_means();
+        let sums: Vec<(f64, f64)> = (0..channels)
+            .map(|channel| {
+                let tiles = counts.iter().enumerate().map(|(t, count)| (t * channels + channel, count / total));
+                tiles.filter(|(i, _)| means[*i].is_finite()).fold((0.0, 0.0), |(mean, variance), (i, weight)| {
+                    (mean + weight * means[i], variance + weight * weight * variances[i].0)
+                })
+            })
+            .collect();
+        let brightest = sums.iter().map(|(mean, _)| mean.abs()).fold(0.0, f64::max);
+        let bright = sums.iter().filter(|(mean, _)| mean.abs() > 0.01 * brightest);
+        bright.map(|(mean, variance)| variance.sqrt() / mean.abs()).fold(0.0, f64::max)
+    }
+
     /// Means over the tiles, NaN for a tile with a value that is not finite.
     pub fn tile_means(&self) -> Vec<f64> {
         tile_means(&self.mean, self.size, self.channels.len())
