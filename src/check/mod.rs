@@ -57,7 +57,8 @@ pub struct Options {
     pub reading: lucerna_core::scene::xml::LoadOptions,
     /// Width, and height if not the scene's aspect, instead of the scene's size.
     pub size: Option<(u32, Option<u32>)>,
-    /// Samples per pixel of all the reference's passes together, instead of as many as [`TARGET`] needs.
+    /// Samples per pixel of all passes together, instead of as many as [`TARGET`] needs: of the reference, or of Lucerna
+    /// where the reference is stored.
     pub spp: Option<u32>,
     /// First seed.
     pub seed: u32,
@@ -183,11 +184,12 @@ fn check_statistically(
     level: f64,
 ) -> Result<Outcome, Refusal> {
     let mut ours = Ours::load(registry, path, options)?;
-    let stored = if options.fresh || options.spp.is_some() { None } else { stored::find(path, &ours, options)? };
+    let stored = if options.fresh { None } else { stored::find(path, &ours, options)? };
     if let Some(entry) = &stored {
         ours = ours.at_size(registry, entry.size, options)?;
     }
     let independent = ours.has_independent_pixels();
+    let fixed = options.spp.filter(|_| stored.is_some());
     let look = |ours: &Ours, number: u32| -> Result<(Measured, Reference), Refusal> {
         let reference = match &stored {
             Some(entry) => entry.load()?,
@@ -197,7 +199,7 @@ fn check_statistically(
                 reference::measure(ours, options, spp, options.seed.wrapping_add(number * FRESH))?
             }
         };
-        let own = ours.measure_like(&reference, independent, options.seed.wrapping_add(1000 + number * FRESH))?;
+        let own = ours.measure_like(&reference, fixed, options.seed.wrapping_add(1000 + number * FRESH))?;
         Ok((own, reference))
     };
     let with = |own: &Measured, reference: &Reference| {
@@ -222,7 +224,7 @@ fn check_statistically(
             notes.push("found again with fresh random numbers".to_owned());
             if !options.reference_offsets {
                 ours.use_reference_offsets();
-                let offset = ours.measure_like(&again, independent, options.seed.wrapping_add(1000 + 2 * FRESH))?;
+                let offset = ours.measure_like(&again, fixed, options.seed.wrapping_add(1000 + 2 * FRESH))?;
                 if with(&offset, &again)?.agrees() {
                     verdict = Verdict::Offset;
                     notes.push("agrees if rays start as far off surfaces as the reference's do".to_owned());

@@ -6,6 +6,7 @@ use lucerna_core::image::Image;
 use lucerna_core::render::{Budget, Control, RenderContext};
 use lucerna_core::scene::{Description, ObjectKind, Registry, Scene, SceneErrors, instantiate, resolve, upgrade, xml};
 use lucerna_core::stats::Measured;
+use lucerna_core::stats::images::variance_ratio;
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
 
@@ -156,42 +157,56 @@ impl Ours {
         (0..passes).map(|pass| self.render(spp, seed.wrapping_add(pass), tabulate)).collect()
     }
 
-    /// The samples per pixel that bring the standard error of the image mean to [`TARGET`], as a power of two: changes
-    /// of the renderer that leave its noise alone leave the number alone.
+    /// The samples per pixel the reference is to take, after a trial: see [`plan_spp`].
     pub fn plan(&self, seed: u32) -> Result<u32, Refusal> {
         let (passes, spp) = TRIAL;
         let images = self.passes(passes, spp, seed.wrapping_add(500), false)?;
         let trial = Measured::of(&images, &compared(&images[0].channels)).map_err(Refusal::Failed)?;
-        let error = trial.relative_error_of_mean(self.has_independent_pixels());
-        let needed = f64::from(passes * spp) * (error / TARGET).powi(2);
-        let [width, height] = self.size().map(u64::from);
-        let most = ((MOST_SAMPLES / (width * height).max(1)) as u32).clamp(FEWEST_SPP, MOST_SPP);
-        let whole = needed.clamp(f64::from(FEWEST_SPP), f64::from(most)) as u32;
-        Ok(whole.next_power_of_two().min(1 << most.ilog2()))
+        Ok(plan_spp(&trial, self.has_independent_pixels()))
     }
 
-    /// Passes to about the reference's standard error.
-    pub fn measure_like(&self, reference: &Reference, independent: bool, seed: u32) -> Result<Measured, Refusal> {
+    /// Passes of so many samples per pixel in all, or to about the reference's standard error.
+    pub fn measure_like(&self, reference: &Reference, fixed: Option<u32>, seed: u32) -> Result<Measured, Refusal> {
         let theirs = &reference.measured;
-        let (passes, spp) = TRIAL;
-        let channels = &theirs.channels;
-        let trial = self.passes(passes, spp, seed.wrapping_add(500), reference.tabulated)?;
-        let trial = Measured::of(&trial, channels).map_err(Refusal::Failed)?;
-        if trial.size != theirs.size {
-            let ([a, b], [c, d]) = (trial.size, theirs.size);
+        if self.size() != theirs.size {
+            let ([a, b], [c, d]) = (self.size(), theirs.size);
             return Err(Refusal::Failed(format!("ours has {a} x {b} pixels, the reference {c} x {d}")));
         }
-        // What the trial's variance is above the reference's, that many times more samples are needed.
-        let ratio = lucerna_core::stats::images::variance_ratio(&trial, theirs) * f64::from(passes * spp);
-        let equal = ratio / f64::from(PASSES);
-        // Never so few that a wide filter's division by its weights shows.
-        let least = f64::from(reference.spp) / if independent { 4.0 } else { 1.0 };
-        let chosen = equal.clamp(least.max(1.0), 4.0 * f64::from(reference.spp)).round() as u32;
-        let chosen = if chosen.is_power_of_two() { chosen } else { chosen.next_power_of_two() };
-        let images = self.passes(PASSES, chosen, seed, reference.tabulated)?;
-        self.total_spp.set(chosen * PASSES);
-        Measured::of(&images, channels).map_err(Refusal::Failed)
+        let spp = match fixed {
+            Some(total) => (total / PASSES).max(1),
+            None => self.equal_spp(reference, seed)?,
+        };
+        let images = self.passes(PASSES, spp, seed, reference.tabulated)?;
+        self.total_spp.set(spp * PASSES);
+        Measured::of(&images, &theirs.channels).map_err(Refusal::Failed)
     }
+
+    /// The samples per pixel of a pass that give the reference's standard error, as a power of two.
+    fn equal_spp(&self, reference: &Reference, seed: u32) -> Result<u32, Refusal> {
+        let (passes, spp) = TRIAL;
+        let trial = self.passes(passes, spp, seed.wrapping_add(500), reference.tabulated)?;
+        let trial = Measured::of(&trial, &reference.measured.channels).map_err(Refusal::Failed)?;
+        // What the trial's variance is above the reference's, that many times more samples are needed.
+        let above = variance_ratio(&trial, &reference.measured);
+        let equal = above * f64::from(passes * spp) / f64::from(PASSES);
+        // A wide filter divides by the sum of its weights, with an error that falls with the samples of a pass: that
+        // is to be the reference's.
+        let spp = f64::from(reference.spp);
+        let least = if self.has_independent_pixels() { (spp / 4.0).max(1.0) } else { spp };
+        Ok((equal.clamp(least, 4.0 * spp).round() as u32).next_power_of_two())
+    }
+}
+
+/// The samples per pixel, of all passes together, that bring the standard error of the image mean to [`TARGET`]; from a
+/// trial of 8 passes with 16 samples per pixel each. A power of two: changes of the renderer that leave its noise alone
+/// leave the number alone.
+pub fn plan_spp(trial: &Measured, independent_pixels: bool) -> u32 {
+    let error = trial.relative_error_of_mean(independent_pixels);
+    let needed = f64::from(TRIAL.0 * TRIAL.1) * (error / TARGET).powi(2);
+    let pixels = u64::from(trial.size[0]) * u64::from(trial.size[1]);
+    let most = ((MOST_SAMPLES / pixels.max(1)).min(u64::from(MOST_SPP)) as u32).max(FEWEST_SPP);
+    let whole = needed.clamp(f64::from(FEWEST_SPP), f64::from(most)) as u32;
+    whole.next_power_of_two().min(1 << most.ilog2())
 }
 
 /// Errors of a scene as one line, and whether it is only that something is not built.

@@ -45,7 +45,7 @@ pub struct Arguments {
     #[arg(long, value_name = "W[xH]", value_parser = size)]
     size: Option<(u32, Option<u32>)>,
 
-    /// Samples per pixel of the reference, instead of as many as it takes to find 0.3 % in the mean
+    /// Samples per pixel of the reference (where that is stored, of Lucerna), instead of as many as find 0.3 % in the mean
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     spp: Option<u32>,
 
