@@ -1,6 +1,6 @@
 //! What `lucerna check` finds: planted errors are found with the samples it takes by default, and honest pictures pass.
 //!
-//! A scene with a lamp is rendered in independent passes; another run plays the reference. The table of errors, the
+//! A scene with direct light is rendered in independent passes; another run plays the reference. The table of errors, the
 //! test that finds each and the samples it takes is `reference/detection.md`; with `LUCERNA_UPDATE=1` this test
 //! writes it.
 
@@ -12,7 +12,7 @@ use lucerna::core::image::Image;
 use lucerna::core::scene::{Description, ObjectKind, Parameter, Scene, Value};
 use lucerna::core::stats::Measured;
 use lucerna::core::stats::chi2::sidak;
-use lucerna::core::stats::images::{Comparison, Scale, compare};
+use lucerna::core::stats::images::{Scale, compare};
 use rayon::prelude::*;
 use std::fmt::Write as _;
 use support::{load, render_with, repository};
@@ -24,11 +24,16 @@ const RES: u32 = 32;
 const SCENES: usize = 200;
 
 /// Samples per pixel of a pass that are tried.
-const BUDGETS: [u32; 6] = [1, 4, 16, 64, 128, 256];
+const BUDGETS: [u32; 7] = [1, 4, 16, 64, 256, 1024, 4096];
 
 fn scene(change: impl FnOnce(&mut Description)) -> Scene {
-    load(&repository("scenes/tests/emitters/area_rectangle.xml"), &[], |description| {
+    load(&repository("scenes/tests/emitters/point.xml"), &[], |description| {
         description.resize_films([RES; 2], "test");
+        for node in description.nodes.iter_mut().filter(|n| n.kind == ObjectKind::Integrator) {
+            node.take("max_depth");
+            let (name, at) = ("max_depth".to_owned(), node.at.clone());
+            node.parameters.push(Parameter { name, value: Value::Integer(2), at });
+        }
         change(description);
     })
 }
@@ -95,7 +100,6 @@ fn planted() -> Vec<Planted> {
         ("one tile 2 % darker", by_value(|x, y, _, v| if x / 8 == 1 && y / 8 == 2 { 0.98 * v } else { v })),
         ("one pixel 20 % brighter", by_value(|x, y, _, v| if (x, y) == (13, 21) { 1.2 * v } else { v })),
         ("gradient of ±1 % across the picture", by_value(|x, _, _, v| v * (0.99 + 0.02 * x as f32 / (RES - 1) as f32))),
-        ("light clipped at 1", by_value(|_, _, _, v| v.min(1.0))),
         (
             "red and blue swapped",
             Box::new(|images, _| {
@@ -117,16 +121,6 @@ fn planted() -> Vec<Planted> {
     ]
 }
 
-/// The test that finds the error, the one farthest beyond its limit first.
-fn finder(comparison: &Comparison) -> Option<Scale> {
-    let excess = |scale: Scale| {
-        let (value, limit) = comparison.test(scale).worst();
-        value.t.abs() / limit
-    };
-    let failed = comparison.tests.iter().filter(|test| !test.passes()).map(|test| test.scale);
-    failed.max_by(|a, b| excess(*a).total_cmp(&excess(*b)))
-}
-
 #[test]
 fn planted_errors_are_found_at_the_default_budget() {
     let box_filter = with_filter("box");
@@ -137,7 +131,8 @@ fn planted_errors_are_found_at_the_default_budget() {
 
     let level = sidak(SIGNIFICANCE, SCENES);
     let planted = planted();
-    let mut first: Vec<Option<(u32, Scale)>> = vec![None; planted.len()];
+    // The fewest samples with which each of the three tests finds each error.
+    let mut first = vec![[None; 3]; planted.len()];
     let mut missed = Vec::new();
     for spp in BUDGETS.into_iter().filter(|spp| *spp <= default) {
         let ours = passes(&box_filter, spp, 1000);
@@ -147,23 +142,29 @@ fn planted_errors_are_found_at_the_default_budget() {
         missed.clear();
         for ((name, plant), first) in planted.iter().zip(&mut first) {
             let found = compare(&measured(&plant(&ours, spp)), &reference, true, level).expect("comparable");
-            match finder(&found) {
-                Some(scale) => *first = first.or(Some((spp, scale))),
-                None => missed.push(*name),
+            for (_, first) in found.tests.iter().zip(first.iter_mut()).filter(|(test, _)| !test.passes()) {
+                *first = first.or(Some(spp * PASSES));
+            }
+            // Where there is no noise, single pixels find any factor: what is claimed is that the mean does, too.
+            let found_as_claimed = !name.starts_with("0.3 %") || !found.test(Scale::Mean).passes();
+            if found.agrees() || !found_as_claimed {
+                missed.push(*name);
             }
         }
     }
     assert!(missed.is_empty(), "not found with {default} samples per pixel and pass: {missed:?}");
 
     let mut table = format!(
-        "# What `lucerna check` finds\n\nErrors planted in `scenes/tests/emitters/area_rectangle.xml` at {RES} × {RES} pixels under a box filter, at the level of one in \
-         {SCENES} scenes. By default, {} samples per pixel\nare taken there. Written by `tests/detection.rs`.\n\n\
-         | error | found by the test of | samples per pixel needed, of those tried |\n|---|---|---|\n",
+        "# What `lucerna check` finds\n\nErrors planted in the direct light of `scenes/tests/emitters/point.xml` at \
+         {RES} × {RES} pixels under a box\nfilter, at the level of one in {SCENES} scenes; and the samples per pixel, of those \
+         tried, with which each test finds them.\nBy default, {} are taken there. Written by `tests/detection.rs`.\n\n\
+         | error | pixels | tiles | mean |\n|---|---|---|---|\n",
         default * PASSES
     );
-    for ((name, _), first) in planted.iter().zip(&first) {
-        let (spp, scale) = first.expect("found");
-        let _ = writeln!(table, "| {name} | {scale} | {} |", spp * PASSES);
+    for ((name, _), first) in planted.iter().zip(first) {
+        let cell = |found: Option<u32>| found.map_or_else(|| "not".to_owned(), |spp| spp.to_string());
+        let [pixels, tiles, mean] = first.map(cell);
+        let _ = writeln!(table, "| {name} | {pixels} | {tiles} | {mean} |");
     }
     print!("{table}");
     let path = repository("reference/detection.md");

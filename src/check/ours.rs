@@ -18,7 +18,7 @@ const TRIAL: (u32, u32) = (8, 16);
 
 /// Fewest and most samples per pixel that a plan asks for, and most samples of the picture (which yields to the fewest).
 const FEWEST_SPP: u32 = 256;
-const MOST_SPP: u32 = 1 << 14;
+const MOST_SPP: u32 = 1 << 16;
 const MOST_SAMPLES: u64 = 1 << 26;
 
 /// A scene, ready to be rendered by both.
