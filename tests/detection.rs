@@ -83,16 +83,16 @@ fn changed(images: &[Image], change: impl Fn(u32, u32, &str, f32) -> f32) -> Vec
     images
 }
 
-/// The error's name, and our pictures with it at a number of samples per pass.
-type Planted = (&'static str, Box<dyn Fn(&[Image], u32) -> Vec<Image>>);
+/// Our pictures with an error, from those without and the samples per pixel of a pass.
+type Plant = Box<dyn Fn(&[Image], u32) -> Vec<Image>>;
+
+/// The error's name, and the error.
+type Planted = (&'static str, Plant);
 
 fn planted() -> Vec<Planted> {
-    let by_value = |change: fn(u32, u32, &str, f32) -> f32| -> Box<dyn Fn(&[Image], u32) -> Vec<Image>> {
-        Box::new(move |images, _| changed(images, change))
-    };
-    let by_scene = |scene: Scene| -> Box<dyn Fn(&[Image], u32) -> Vec<Image>> {
-        Box::new(move |_, spp| passes(&scene, spp, 7000))
-    };
+    let by_value =
+        |change: fn(u32, u32, &str, f32) -> f32| -> Plant { Box::new(move |images, _| changed(images, change)) };
+    let by_scene = |scene: Scene| -> Plant { Box::new(move |_, spp| passes(&scene, spp, 7000)) };
     vec![
         ("0.3 % brighter", by_value(|_, _, _, v| 1.003 * v)),
         ("0.3 % darker", by_value(|_, _, _, v| 0.997 * v)),

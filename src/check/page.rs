@@ -65,18 +65,18 @@ fn section(outcome: &Outcome, findings: &Findings, maps: &[Map], folder: &Path) 
         Verdict::Differs => "bad",
         _ => "so",
     };
-    let _ = write!(
+    let _ = writeln!(
         html,
-        "<section><h2>{} <span class=\"{class}\">{}</span></h2>\n<p>{}</p>\n",
+        "<section><h2>{} <span class=\"{class}\">{}</span></h2>\n<p>{}</p>",
         escape(&outcome.scene.display().to_string()),
         outcome.verdict.text(),
         sentence(outcome, findings)
     );
     let [width, height] = findings.theirs.size;
-    let _ = write!(
+    let _ = writeln!(
         html,
         "<p class=\"small\">{width} × {height} pixels. Reference: {}, {} samples per pixel. Lucerna: {} samples per pixel. \
-         Rendered in {:.1} s, the reference in {:.1} s. Files: {}</p>\n",
+         Rendered in {:.1} s, the reference in {:.1} s. Files: {}</p>",
         escape(&outcome.reference),
         outcome.spp[1],
         outcome.spp[0],
@@ -86,7 +86,7 @@ fn section(outcome: &Outcome, findings: &Findings, maps: &[Map], folder: &Path) 
     );
     if !outcome.notes.is_empty() {
         let notes: String = outcome.notes.iter().map(|note| format!("<li>{}</li>", escape(note))).collect();
-        let _ = write!(html, "<ul>{notes}</ul>\n");
+        let _ = writeln!(html, "<ul>{notes}</ul>");
     }
     if let Some(comparison) = &findings.comparison {
         html.push_str(&tests_table(comparison));
@@ -153,9 +153,9 @@ fn tests_table(comparison: &Comparison) -> String {
         );
         let verdict =
             if test.passes() { "<span class=\"good\">agree</span>" } else { "<span class=\"bad\">differ</span>" };
-        let _ = write!(
+        let _ = writeln!(
             rows,
-            "<tr><td>{what}</td><td>{verdict}</td><td>{worst:.1} σ</td><td>{limit:.1} σ</td><td>{} of {}</td></tr>\n",
+            "<tr><td>{what}</td><td>{verdict}</td><td>{worst:.1} σ</td><td>{limit:.1} σ</td><td>{} of {}</td></tr>",
             test.failed.len(),
             test.values.len()
         );
@@ -180,9 +180,9 @@ fn places_table(comparison: &Comparison) -> String {
         } else {
             format!("{:+.2} %", 100.0 * (value.ours / value.theirs - 1.0))
         };
-        let _ = write!(
+        let _ = writeln!(
             rows,
-            "<tr><td>{x}, {y}</td><td>{}</td><td>{:.5}</td><td>{:.5}</td><td>{percent}</td><td>{:+.1} σ</td></tr>\n",
+            "<tr><td>{x}, {y}</td><td>{}</td><td>{:.5}</td><td>{:.5}</td><td>{percent}</td><td>{:+.1} σ</td></tr>",
             escape(channel),
             value.ours,
             value.theirs,
