@@ -19,6 +19,7 @@ impl Draft {
             warnings: Vec::new(),
             confined_to: None,
             file_versions: Vec::new(),
+            sources: Vec::new(),
         };
         Draft(empty).node(kind, plugin)
     }

@@ -35,6 +35,9 @@ import xml.etree.ElementTree as ElementTree
 import zlib
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from passes import Job  # noqa: E402
+
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 MANIFEST = HERE / "manifest.toml"
@@ -129,11 +132,11 @@ def files_of(scene, defines):
 
 
 def scene_hash(scene, defines):
-    """SHA-256 over the lines `<path relative to the scene> <SHA-256 of the file>\\n`, scene first."""
+    """SHA-256 over the sorted lines `<path relative to the scene> <SHA-256 of the file>\\n`."""
     total = hashlib.sha256()
-    for file in files_of(scene, defines):
-        digest = hashlib.sha256(file.read_bytes()).hexdigest()
-        total.update(f"{os.path.relpath(file, scene.resolve().parent)} {digest}\n".encode())
+    folder = scene.resolve().parent
+    for name, file in sorted((os.path.relpath(file, folder), file) for file in files_of(scene, defines)):
+        total.update(f"{name} {hashlib.sha256(file.read_bytes()).hexdigest()}\n".encode())
     return total.hexdigest()
 
 
@@ -184,37 +187,6 @@ def prune():
 
 
 # ---- rendering ------------------------------------------------------------------------------------
-
-class Job:
-    """One scene, loaded with a variant; renders passes as float32 arrays of shape (H, W, C)."""
-
-    def __init__(self, scene, variant, defines, size=None, integrator=None):
-        import mitsuba as mi
-        mi.set_log_level(mi.LogLevel.Error)
-        mi.set_variant(variant)
-        if variant.startswith("scalar"):
-            import drjit
-            drjit.set_thread_count(2)  # the block size of small pictures depends on it
-        self.mi, self.scene = mi, mi.load_file(str(scene), **defines)
-        self.film = self.scene.sensors()[0].film()
-        if size:
-            parameters = mi.traverse(self.scene)
-            for key in [k for k in parameters.keys() if k.endswith("film.size")]:
-                parameters[key] = size
-                parameters[key[:-len("size")] + "crop_size"] = size
-            parameters.update()
-        self.integrator = mi.load_dict(integrator) if integrator else self.scene.integrator()
-
-    def render(self, spp, seed):
-        import numpy
-        self.mi.render(self.scene, integrator=self.integrator, spp=spp, seed=seed)
-        # All channels the film holds, as its file has them: `aov` returns fewer from render().
-        image = numpy.array(self.film.bitmap(), dtype=numpy.float32)
-        return numpy.atleast_3d(image)
-
-    def channels(self):
-        return [field.name for field in self.film.bitmap().struct_()]
-
 
 def rounded(values, bits):
     """The values as float32 with `bits` bits of mantissa, which compress better."""

@@ -80,6 +80,7 @@ fn build_nested(nodes: Vec<Node>) -> Result<Object, SceneErrors> {
         warnings: Vec::new(),
         confined_to: None,
         file_versions: Vec::new(),
+        sources: Vec::new(),
     };
     build_one(&crate::builtin(), &description)
 }

@@ -1,5 +1,6 @@
 //! The command line: one file per subcommand.
 
+mod check;
 mod convert;
 mod info;
 mod plugins;
@@ -12,8 +13,7 @@ use lucerna_core::scene::Registry;
 use std::process::ExitCode;
 
 /// Told at the end of the help.
-const EXIT_CODES: &str =
-    "Exit codes: 0 done; 2 could not run (arguments, scene or output); 3 bad samples under --strict-nan";
+const EXIT_CODES: &str = "Exit codes: 0 done; 1 a scene differs (check); 2 could not run (arguments, scene or output); 3 bad samples under --strict-nan";
 
 /// Exit code of a run that could not be done.
 const FAILURE: u8 = 2;
@@ -29,6 +29,8 @@ struct Arguments {
 enum Command {
     /// Render a scene (without one: the built-in Cornell box)
     Render(Box<render::Arguments>),
+    /// Compare scenes with the reference renderer
+    Check(Box<check::Arguments>),
     /// Write an old scene in today's language
     Convert(convert::Arguments),
     /// List plugins, or the parameters of one
@@ -58,6 +60,7 @@ pub fn run(registry: &Registry) -> ExitCode {
     let arguments = Arguments::parse();
     let done = match arguments.command {
         Command::Render(arguments) => render::run(registry, &arguments),
+        Command::Check(arguments) => check::run(registry, &arguments),
         Command::Convert(arguments) => convert::run(&arguments),
         Command::Plugins(arguments) => plugins::run(registry, &arguments),
         Command::Info(arguments) => info::run(registry, &arguments),
@@ -66,6 +69,13 @@ pub fn run(registry: &Registry) -> ExitCode {
         eprintln!("{message}");
         ExitCode::from(FAILURE)
     })
+}
+
+/// Renders with so many threads, if a number is given.
+fn set_threads(threads: Option<u16>) -> Result<(), Failure> {
+    let Some(threads) = threads else { return Ok(()) };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
+    pool.build_global().map_err(|e| Failure::new(format!("cannot start {threads} threads: {e}")))
 }
 
 /// `key=value` of an option.

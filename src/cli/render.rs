@@ -128,18 +128,13 @@ pub fn run(registry: &Registry, arguments: &Arguments) -> Result<ExitCode, Failu
     if arguments.pixel.is_none() {
         image::check_writable(&output).map_err(|e| Failure::new(format!("{}: {e}", output.display())))?;
     }
-    if let Some(threads) = arguments.threads {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(threads.into())
-            .build_global()
-            .map_err(|e| Failure::new(format!("cannot start {threads} threads: {e}")))?;
-    }
+    super::set_threads(arguments.threads)?;
     let mut description = arguments.scene.describe()?;
     if let Some(text) = &arguments.integrator {
         replace_child(&mut description, ObjectKind::Integrator, text)?;
     }
     if let Some(size) = arguments.size {
-        resize(&mut description, size);
+        description.resize_films(size, "--size");
     }
     let is_integrator = |id| description.node(id).kind == ObjectKind::Integrator;
     let chosen = description.children(description.root).map(|(_, child)| child).find(|child| is_integrator(*child));
@@ -390,19 +385,6 @@ fn peak_memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
     line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib >> 10)
-}
-
-/// Gives every film another size.
-fn resize(description: &mut Description, size: [u32; 2]) {
-    for node in description.nodes.iter_mut().filter(|node| node.kind == ObjectKind::Film) {
-        for name in ["width", "height", "crop_width", "crop_height", "crop_offset_x", "crop_offset_y"] {
-            node.take(name);
-        }
-        for (name, value) in [("width", size[0]), ("height", size[1])] {
-            let (name, at) = (name.to_owned(), Location::file("--size"));
-            node.parameters.push(Parameter { name, value: Value::Integer(value.into()), at });
-        }
-    }
 }
 
 /// Puts an object from the command line in the place of the scene's own.

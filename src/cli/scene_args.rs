@@ -41,7 +41,8 @@ pub struct ReadingArguments {
 }
 
 impl ReadingArguments {
-    fn options(&self) -> LoadOptions {
+    /// As the loader takes it.
+    pub fn options(&self) -> LoadOptions {
         LoadOptions {
             defines: self.defines.clone(),
             search_path: self.append.iter().flat_map(|list| list.split(';')).map(PathBuf::from).collect(),

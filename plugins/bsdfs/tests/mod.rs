@@ -64,6 +64,7 @@ fn try_build(lines: &str) -> Result<Arc<dyn Bsdf>, SceneErrors> {
         warnings: Vec::new(),
         confined_to: None,
         file_versions: Vec::new(),
+        sources: Vec::new(),
     };
     let mut open: Vec<NodeId> = Vec::new();
     for line in lines.split(['\n', ';']).map(str::trim).filter(|l| !l.is_empty()) {

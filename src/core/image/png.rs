@@ -1,5 +1,6 @@
 //! PNG as a result for viewing.
 
+use std::io::Write;
 use std::path::Path;
 
 use ::image::codecs::png::PngEncoder;
@@ -14,12 +15,23 @@ use crate::io::{IoError, Result, output};
 /// # Errors
 /// If the file cannot be written or the sizes in `image` do not fit together.
 pub fn write_srgb(path: &Path, image: &Image) -> Result<()> {
-    let bytes: Vec<u8> = image.rgb()?.flat_map(|pixel| pixel.map(linear_to_srgb_byte)).collect();
+    let file_bytes = encode_srgb(image)?;
     output::replace_file(path, |file| {
-        PngEncoder::new(file)
-            .write_image(&bytes, image.width, image.height, ExtendedColorType::Rgb8)
-            .map_err(|error| IoError::from_library("cannot write the PNG file", error))
+        file.write_all(&file_bytes).map_err(|error| IoError::from_library("cannot write the PNG file", error))
     })
+}
+
+/// As [`write_srgb`], into memory.
+///
+/// # Errors
+/// If the sizes in `image` do not fit together.
+pub fn encode_srgb(image: &Image) -> Result<Vec<u8>> {
+    let bytes: Vec<u8> = image.rgb()?.flat_map(|pixel| pixel.map(linear_to_srgb_byte)).collect();
+    let mut encoded = Vec::new();
+    PngEncoder::new(&mut encoded)
+        .write_image(&bytes, image.width, image.height, ExtendedColorType::Rgb8)
+        .map_err(|error| IoError::from_library("cannot write the PNG file", error))?;
+    Ok(encoded)
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ mod bad_samples;
 mod control;
 mod film_store;
 mod reference_order;
+mod tabulated_filter;
 mod tiles;
 
 pub use bad_samples::{BadSample, BadSamples};
@@ -20,6 +21,8 @@ use crate::interfaces::{FilmSettings, Sampler, Sensor};
 use crate::math::{UVec2, Vec2};
 use crate::scene::{BuiltSensor, Scene};
 use std::fmt;
+use std::sync::Arc;
+use tabulated_filter::TabulatedFilter;
 
 /// In which order random numbers are spent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -93,6 +96,20 @@ impl<'a> RenderContext<'a> {
         let offset = self.sampler.seed();
         let size = self.film.crop_size + 2 * self.border();
         Some(ReferenceOrder::new(size, self.seed.wrapping_sub(offset), offset, threads))
+    }
+
+    /// Spends random numbers and looks filters up as the reference's `scalar_rgb` does with so many threads (its workers
+    /// and one more), so that its noise comes out.
+    pub fn follow_reference(&mut self, threads: u32) {
+        self.order = SampleOrder::Reference { threads };
+        self.tabulate_filter();
+    }
+
+    /// Looks a filter that is wider than a pixel up in a table, as the reference's scalar variants do.
+    pub fn tabulate_filter(&mut self) {
+        if !self.film.filter.is_box() {
+            self.film.filter = Arc::new(TabulatedFilter::new(&*self.film.filter));
+        }
     }
 
     /// How far beside a camera ray its offset rays pass, in units of the film: one pixel over the square root of the

@@ -7,6 +7,7 @@
 use super::error::Location;
 use crate::io::plain_io_error;
 use glam::DMat4;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -234,6 +235,8 @@ pub struct Description {
     /// The `version` of each included file where it differs from that of the main file, by the file's name as in
     /// [`Location`].
     pub file_versions: Vec<(Arc<str>, [u32; 3])>,
+    /// The files this was read from: the scene, what it includes, and spectra. A file may occur several times.
+    pub sources: Vec<PathBuf>,
 }
 
 impl Description {
@@ -248,7 +251,32 @@ impl Description {
             warnings: Vec::new(),
             confined_to: None,
             file_versions: Vec::new(),
+            sources: Vec::new(),
         }
+    }
+
+    /// Gives every film another size; a crop window is dropped. `option` is what messages name as its place.
+    pub fn resize_films(&mut self, size: [u32; 2], option: &str) {
+        for node in self.nodes.iter_mut().filter(|node| node.kind == ObjectKind::Film) {
+            for name in ["width", "height", "crop_width", "crop_height", "crop_offset_x", "crop_offset_y"] {
+                node.take(name);
+            }
+            for (name, value) in [("width", size[0]), ("height", size[1])] {
+                let (name, at) = (name.to_owned(), Location::file(option));
+                node.parameters.push(Parameter { name, value: Value::Integer(value.into()), at });
+            }
+        }
+    }
+
+    /// Every existing file the scene depends on: its [`sources`](Self::sources), and what its objects name as
+    /// `filename`. Complete only before [`resolve`](super::resolve) drops what is not used.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let named = self.nodes.iter().flat_map(|node| &node.parameters).filter_map(|p| match &p.value {
+            Value::String(name) if p.name == "filename" => self.find_file(name),
+            _ => None,
+        });
+        let files: BTreeSet<PathBuf> = self.sources.iter().cloned().chain(named).collect();
+        files.into_iter().collect()
     }
 
     /// A node.

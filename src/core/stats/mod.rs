@@ -1,4 +1,10 @@
 //! Statistics that tests and comparisons rest on.
 
+pub mod agreement;
 pub mod chi2;
 pub mod figures;
+pub mod images;
+mod measured;
+pub mod student;
+
+pub use measured::{Measured, TILE};

@@ -70,6 +70,7 @@ pub(super) fn load(main: Main, options: &LoadOptions) -> Result<Description, Sce
             warnings: Vec::new(),
             confined_to: options.root.clone(),
             file_versions: Vec::new(),
+            sources: Vec::new(),
         },
         ids: HashMap::new(),
         aliases: HashMap::new(),
@@ -145,6 +146,7 @@ impl Loader<'_> {
             .and_then(|bytes| source::decode(&bytes, &name));
         match text {
             Ok(text) => {
+                self.description.sources.push(path.to_owned());
                 let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
                 self.open_files.push(OpenFile { name: Arc::clone(&name), real });
                 let root = self.read_text(&text, name, path.parent().unwrap_or(Path::new("")));
@@ -173,6 +175,11 @@ impl Loader<'_> {
                 None
             }
         }
+    }
+
+    /// Notes that the scene depends on a file that an element names.
+    pub fn add_source(&mut self, filename: &str) {
+        self.description.sources.extend(self.description.find_file(filename));
     }
 
     /// Checks that need the whole scene, and the result.

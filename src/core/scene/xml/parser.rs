@@ -365,6 +365,9 @@ impl<'l, 'o> FileParser<'l, 'o> {
                 if let Some(note) = note {
                     self.loader.notes.add(note, at);
                 }
+                if let (Value::Spectrum(_), Some(file)) = (&value, attributes.get("filename")) {
+                    self.loader.add_source(file);
+                }
                 self.attach(name, value, at);
             }
             Err(wrong) => {
