@@ -1,7 +1,7 @@
 //! What `lucerna check` finds: planted errors are found with the samples it takes by default, and honest pictures pass.
 //!
 //! A scene with direct light is rendered in independent passes; another run plays the reference. The table of errors, the
-//! test that finds each and the samples it takes is `reference/detection.md`; with `LUCERNA_UPDATE=1` this test
+//! test that finds each and the samples it takes is `reference/detection.md`; with `LUCERNA_UPDATE_EXPECTED=1` this test
 //! writes it.
 
 mod support;
@@ -168,11 +168,11 @@ fn planted_errors_are_found_at_the_default_budget() {
     }
     print!("{table}");
     let path = repository("reference/detection.md");
-    if std::env::var_os("LUCERNA_UPDATE").is_some() {
+    if std::env::var_os("LUCERNA_UPDATE_EXPECTED").is_some() {
         std::fs::write(&path, &table).expect("written");
     }
     let stored = std::fs::read_to_string(&path).unwrap_or_default();
-    assert_eq!(stored, table, "{} is not current; LUCERNA_UPDATE=1 writes it", path.display());
+    assert_eq!(stored, table, "{} is not current; LUCERNA_UPDATE_EXPECTED=1 writes it", path.display());
 }
 
 /// Two hundred honest comparisons of rendered pictures, box and wide filter in turns: glossy light paths have heavy

@@ -401,7 +401,8 @@ mod tests {
     fn reads_what_tobj_reads() {
         // The oracle gives up when only some vertices carry a colour.
         assert_equals_oracle(FULL.replace(" 0.5 0.5 0.5", "").as_bytes(), "sample");
-        let scenes = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/scenes"));
+        // Scenes of the reader's own: a folder of folders with `models` in them.
+        let Some(scenes) = std::env::var_os("LUCERNA_SCENES") else { return };
         let mut compared = 0;
         for models in std::fs::read_dir(scenes).into_iter().flatten().flatten().map(|e| e.path().join("models")) {
             let mut files: Vec<_> =
@@ -413,6 +414,6 @@ mod tests {
                 compared += 1;
             }
         }
-        assert!(compared > 10 || !scenes.exists());
+        assert!(compared > 10, "{compared} files");
     }
 }

@@ -403,9 +403,9 @@ fn damaged_files_do_no_harm() {
     assert!(loaded > 100, "{loaded}");
 }
 
-/// Published scenes, where they lie beside the repository.
+/// Published scenes: those in the folders of `LUCERNA_SCENES`, if that is set.
 fn published() -> Vec<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/scenes");
+    let folder = std::env::var_os("LUCERNA_SCENES").unwrap_or_default();
     let folders = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
     let files = folders.flat_map(|folder| std::fs::read_dir(folder).into_iter().flatten().flatten());
     files.map(|entry| entry.path()).filter(|path| path.extension().is_some_and(|e| e == "xml")).collect()
