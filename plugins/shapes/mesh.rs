@@ -38,9 +38,13 @@ struct Corner {
 }
 
 impl Corner {
+    /// The point and its error. Along the edges from the first corner, so that far from the origin only one rounding is
+    /// of the coordinates' size (as the weights, whatever their error, lead to some point of the triangle).
+    #[inline]
     fn point(&self) -> (Vec3, Vec3) {
-        let [p0, p1, p2] = [self.p[0] * self.b[0], self.p[1] * self.b[1], self.p[2] * self.b[2]];
-        (p0 + p1 + p2, point_error(p0.abs() + p1.abs() + p2.abs(), 7))
+        let [e1, e2] = [(self.p[1] - self.p[0]) * self.b[1], (self.p[2] - self.p[0]) * self.b[2]];
+        let p = self.p[0] + (e1 + e2);
+        (p, point_error(p.abs(), 1) + point_error(e1.abs() + e2.abs(), 4))
     }
 
     /// Unit normal by winding; zero for a triangle without area.
