@@ -6,7 +6,7 @@ use ::image::codecs::hdr::HdrDecoder;
 use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 
 use super::exr::separate;
-use super::{PixelData, ReadLimits, Samples};
+use super::{PixelData, ReadLimits, Samples, jpeg};
 use crate::io::limits::shielded;
 use crate::io::{IoError, Result};
 
@@ -34,6 +34,11 @@ fn damaged(error: ImageError) -> IoError {
 }
 
 fn decode(bytes: &[u8], format: ImageFormat, limits: &ReadLimits) -> Result<PixelData> {
+    if format == ImageFormat::Jpeg
+        && let Some((width, height, values)) = jpeg::read(bytes, limits)?
+    {
+        return Ok(PixelData { width, height, channels: 3, samples: Samples::U8(values), alpha: None, srgb: true });
+    }
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     let mut decoder_limits = Limits::default();
     decoder_limits.max_image_width = Some(limits.most_side);

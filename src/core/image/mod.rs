@@ -9,6 +9,7 @@
 mod decode;
 pub mod exr;
 pub mod hdr;
+mod jpeg;
 pub mod pfm;
 pub mod png;
 mod srgb;
