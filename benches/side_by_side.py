@@ -7,17 +7,20 @@
 
 Three contestants: `mitsuba` scalar_rgb, `mitsuba` llvm_ad_rgb and the `lucerna` program. They run one after
 another, A B C A B C ..., so that a slow moment of the machine hits all of them; the table gives medians, and ratios
-to Lucerna with the smallest and largest ratio of any round. Two times are told apart:
+to Lucerna with the smallest and largest ratio of any round. Three times are told apart:
 
     render    steady state: the render call alone. `mitsuba` is timed inside a worker process after one warm-up
               (which compiles the llvm kernels); Lucerna reports its own (`--stats-json`).
     process   from the start of a fresh process to its end: start, load, compile, render, write the picture.
+    start     the same with one sample per pixel: how long until a picture is there.
+
+Beside the fresh processes stands the most memory they took at any time; it cannot be told if it is less than that of this
+script, some 20 MiB.
 
 All get the same samples per pixel, picture size and depth: whatever the scene or -D says. The picture means are
 compared as well, since a fast wrong picture is worth nothing.
 """
 import argparse
-import csv
 import json
 import os
 import statistics
@@ -30,6 +33,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "reference"))
 import render as reference  # noqa: E402
+import tables  # noqa: E402
 
 WORKER = r"""
 import json, sys, time
@@ -67,18 +71,34 @@ else:                            # steady state: one render for each line read
 """
 
 
+def fresh(command, name):
+    """Runs a process: its seconds, the most memory it took in MiB, and its output."""
+    with tempfile.TemporaryFile("w+") as output, tempfile.TemporaryFile("w+") as errors:
+        start = time.perf_counter()
+        process = subprocess.Popen([str(word) for word in command], stdin=subprocess.DEVNULL, stdout=output, stderr=errors)
+        _, status, usage = os.wait4(process.pid, 0)
+        seconds = time.perf_counter() - start
+        process.returncode = os.waitstatus_to_exitcode(status)
+        output.seek(0)
+        errors.seek(0)
+        if process.returncode != 0:
+            raise SystemExit(f"{name} failed:\n{errors.read() or output.read()}")
+        # Bytes on macOS, KiB elsewhere.
+        return seconds, usage.ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10), output.read()
+
+
 class Mitsuba:
     """A variant of the reference in a worker process that has loaded, compiled and warmed up."""
 
     def __init__(self, variant, python, scene, arguments):
         self.name, self.python, self.variant = f"mitsuba {variant}", python, variant
         self.scene, self.arguments = scene, arguments
-        self.worker = subprocess.Popen(self.command(None), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self.worker = subprocess.Popen(self.command(arguments.spp, None), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         if self.worker.stdout.readline().strip() != "ready":
             raise SystemExit(f"{self.name}: the worker did not start on {scene}")
 
-    def command(self, output):
-        request = [self.variant, str(self.scene), self.arguments.spp, self.arguments.defines, self.arguments.threads, output]
+    def command(self, spp, output):
+        request = [self.variant, str(self.scene), spp, self.arguments.defines, self.arguments.threads, output]
         return [str(self.python), "-c", WORKER, json.dumps(request)]
 
     def steady(self, round_index):
@@ -86,10 +106,9 @@ class Mitsuba:
         self.worker.stdin.flush()
         return json.loads(self.worker.stdout.readline())
 
-    def process(self, folder):
-        start = time.perf_counter()
-        done = subprocess.run(self.command(str(folder / "mitsuba.exr")), check=True, capture_output=True, text=True)
-        return time.perf_counter() - start, json.loads(done.stdout.splitlines()[-1])
+    def process(self, folder, spp):
+        seconds, mebibytes, output = fresh(self.command(spp, str(folder / "mitsuba.exr")), self.name)
+        return seconds, mebibytes, json.loads(output.splitlines()[-1])
 
     def close(self):
         self.worker.stdin.close()
@@ -105,25 +124,20 @@ class Lucerna:
         self.program, self.scene, self.arguments = program, scene, arguments
         self.folder = tempfile.TemporaryDirectory()
 
-    def run(self, round_index):
+    def run(self, round_index, spp):
         folder = Path(self.folder.name)
         stats, image = folder / "stats.json", folder / "image.exr"
-        command = [str(self.program), "render", str(self.scene), "-o", str(image), "--spp", str(self.arguments.spp),
-                   "--stats-json", str(stats), "--seed", str(round_index + 1)]
+        command = [self.program, "render", self.scene, "-o", image, "--spp", spp, "--stats-json", stats, "--seed", round_index + 1]
         command += [f"-D{key}={value}" for key, value in self.arguments.defines.items()]
-        command += ["--threads", str(self.arguments.threads)] if self.arguments.threads else []
-        start = time.perf_counter()
-        done = subprocess.run(command, capture_output=True, text=True)
-        seconds = time.perf_counter() - start
-        if done.returncode != 0:
-            raise SystemExit(f"lucerna failed on {self.scene}:\n{done.stderr or done.stdout}")
-        return seconds, dict(json.loads(stats.read_text()), image=str(image))
+        command += ["--threads", self.arguments.threads] if self.arguments.threads else []
+        seconds, mebibytes, _ = fresh(command, f"lucerna on {self.scene}")
+        return seconds, mebibytes, dict(json.loads(stats.read_text()), image=str(image))
 
     def steady(self, round_index):
-        return self.run(round_index)[1]
+        return self.run(round_index, self.arguments.spp)[2]
 
-    def process(self, _folder):
-        return self.run(-1)
+    def process(self, _folder, spp):
+        return self.run(-1, spp)
 
     def close(self):
         self.folder.cleanup()
@@ -137,13 +151,15 @@ def mean_of(python, image):
 
 
 def measure(scene, arguments, python):
-    """Rows of one scene: contestant, kind of time, seconds of each round, samples, picture mean."""
+    """Rows of one scene: contestant, kind of time, seconds and peak memory of each round, samples, picture mean."""
     contestants = [Mitsuba(variant, python, scene, arguments) for variant in arguments.variants]
     if arguments.lucerna.exists():
         contestants.append(Lucerna(arguments.lucerna, scene, arguments))
     else:
         print(f"{arguments.lucerna} does not exist: only the reference is timed", file=sys.stderr)
-    rows = {(c.name, kind): {"seconds": [], "samples": 0, "mean": None} for c in contestants for kind in ("render", "process")}
+    kinds = {"process": arguments.spp, "start": 1}
+    rows = {(c.name, kind): {"seconds": [], "mebibytes": [], "samples": 0, "mean": None}
+            for kind in ("render", *kinds) for c in contestants}
     with tempfile.TemporaryDirectory() as folder:
         for round_index in range(arguments.rounds):
             for contestant in contestants:
@@ -154,11 +170,13 @@ def measure(scene, arguments, python):
                 if "image" in result and round_index == arguments.rounds - 1:
                     row["mean"] = mean_of(python, result["image"])
         for _ in range(arguments.process_rounds):
-            for contestant in contestants:
-                seconds, result = contestant.process(Path(folder))
-                row = rows[contestant.name, "process"]
-                row["seconds"].append(seconds)
-                row["samples"] = result["samples"]
+            for kind, spp in kinds.items():
+                for contestant in contestants:
+                    seconds, mebibytes, result = contestant.process(Path(folder), spp)
+                    row = rows[contestant.name, kind]
+                    row["seconds"].append(seconds)
+                    row["mebibytes"].append(mebibytes)
+                    row["samples"] = result["samples"]
     for contestant in contestants:
         contestant.close()
     return rows
@@ -173,7 +191,7 @@ def summarise(scene, rows):
         rates = [row["samples"] / s / 1e6 for s in row["seconds"]]
         line = {"scene": scene.name, "kind": kind, "renderer": name, "rounds": len(rates),
                 "seconds": statistics.median(row["seconds"]), "msamples_per_second": statistics.median(rates),
-                "mean": row["mean"], "ratio": None, "ratio_min": None, "ratio_max": None}
+                "peak_mebibytes": max(row["mebibytes"], default=None), "mean": row["mean"], "ratio": None, "ratio_min": None, "ratio_max": None}
         ours = rows.get(("lucerna", kind))
         if ours and ours["seconds"] and name != "lucerna":
             ratios = [ours["samples"] / a / (row["samples"] / b) for a, b in zip(ours["seconds"], row["seconds"])]
@@ -185,12 +203,13 @@ def summarise(scene, rows):
 def markdown(table, arguments):
     lines = [f"{arguments.spp} samples per pixel, {arguments.rounds} rounds, {os.cpu_count()} cores"
              + (f", {arguments.threads} threads" if arguments.threads else "") + ". Ratio: rate of Lucerna over that of the other (min to max).", "",
-             "| scene | time | renderer | s | Msamples/s | picture mean | ratio |", "|---|---|---|---|---|---|---|"]
+             "| scene | time | renderer | s | Msamples/s | peak MiB | picture mean | ratio |", "|---|---|---|--:|--:|--:|--:|---|"]
     for line in table:
         ratio = f"{line['ratio']:.2f} ({line['ratio_min']:.2f} to {line['ratio_max']:.2f})" if line["ratio"] else ""
         mean = f"{line['mean']:.5f}" if line["mean"] is not None else ""
+        memory = f"{line['peak_mebibytes']:.0f}" if line["peak_mebibytes"] is not None else ""
         lines.append(f"| {line['scene']} | {line['kind']} | {line['renderer']} | {line['seconds']:.3f} | "
-                     f"{line['msamples_per_second']:.2f} | {mean} | {ratio} |")
+                     f"{line['msamples_per_second']:.2f} | {memory} | {mean} | {ratio} |")
     return "\n".join(lines) + "\n"
 
 
@@ -204,9 +223,9 @@ def main():
     parser.add_argument("--threads", type=int, default=0, help="threads of each renderer; 0: their own choice")
     parser.add_argument("--variants", nargs="+", default=["scalar_rgb", "llvm_ad_rgb"])
     parser.add_argument("-D", dest="define", action="append", default=[], metavar="NAME=VALUE")
-    parser.add_argument("--csv", type=Path)
-    parser.add_argument("--markdown", type=Path)
+    tables.add_arguments(parser)
     arguments = parser.parse_args()
+    tables.check_arguments(arguments)
     arguments.defines = dict(pair.split("=", 1) for pair in arguments.define)
 
     python = reference.environment()
@@ -218,10 +237,14 @@ def main():
     if arguments.markdown:
         arguments.markdown.write_text(text)
     if arguments.csv:
-        with arguments.csv.open("w", newline="") as file:
-            writer = csv.DictWriter(file, fieldnames=table[0].keys())
-            writer.writeheader()
-            writer.writerows(table)
+        tables.write_csv(arguments.csv, table)
+    if arguments.plot:
+        groups = {}
+        for line in table:
+            if line["ratio"]:
+                row = (f"{line['scene']}, {line['kind']}", line["ratio"], line["ratio_min"], line["ratio_max"])
+                groups.setdefault(f"to {line['renderer']}", []).append(row)
+        tables.plot_ratios(arguments.plot, f"Whole renders, {arguments.spp} samples per pixel", groups)
 
 
 if __name__ == "__main__":
