@@ -53,7 +53,7 @@ def plot_ratios(path, title, groups):
     axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
     axes.minorticks_off()
     axes.set_yticks(range(len(labels)), labels)
-    axes.invert_yaxis()
+    axes.set_ylim(len(labels) - 0.5, -0.5)
     axes.grid(axis="x", alpha=0.3)
     axes.set_xlabel("speed of Lucerna over that of the other")
     axes.set_title(title, fontsize=10)
