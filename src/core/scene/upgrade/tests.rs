@@ -3,7 +3,7 @@
 use super::super::write::{WriteOptions, to_xml};
 use super::super::{resolve, xml};
 use super::*;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 fn load(version: &str, body: &str) -> Description {
     let text = format!("<scene version=\"{version}\">{body}</scene>");
