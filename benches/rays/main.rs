@@ -58,7 +58,9 @@ fn main() -> ExitCode {
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            // A scene's errors begin with the word already.
+            let text = error.to_string();
+            eprintln!("error: {}", text.trim_start_matches("error: "));
             ExitCode::from(2)
         }
     }
