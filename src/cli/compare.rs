@@ -222,4 +222,3 @@ fn percent(found: &Interval) -> String {
     let half = found.bounds.map(|[low, high]| format!(" ± {:.2}", 50.0 * (high - low)));
     format!("{:+.2}{} %", 100.0 * found.value, half.unwrap_or_default())
 }
-

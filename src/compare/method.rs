@@ -170,9 +170,8 @@ impl Method {
         }
         if let Some(wanted) = &self.sampler {
             let is_sensor = |node: &Node| node.kind == ObjectKind::Sensor;
-            let sensors: Vec<_> = (description.children(root).map(|(_, id)| id))
-                .filter(|id| is_sensor(description.node(*id)))
-                .collect();
+            let sensors: Vec<_> =
+                (description.children(root).map(|(_, id)| id)).filter(|id| is_sensor(description.node(*id))).collect();
             for sensor in sensors {
                 replace(description, sensor, wanted, registry);
             }
@@ -247,7 +246,8 @@ mod tests {
     #[test]
     fn a_method_keeps_what_it_does_not_name() {
         let xml = r#"<scene version="3.0.0"><integrator type="path"><integer name="max_depth" value="6"/></integrator></scene>"#;
-        for (text, depth) in [("path", Some(6)), ("path:max_depth=3", Some(3)), ("volpath", Some(6)), ("direct", None)] {
+        for (text, depth) in [("path", Some(6)), ("path:max_depth=3", Some(3)), ("volpath", Some(6)), ("direct", None)]
+        {
             let mut scene = lucerna_core::scene::xml::load_str(xml, "t.xml", &Default::default()).unwrap();
             Method::of_text(text).unwrap().apply(&mut scene, &crate::builtin());
             let integrators = scene.children(scene.root).map(|(_, id)| scene.node(id));

@@ -267,7 +267,12 @@ fn take_turns(
 type Measurements = (Vec<Point>, Vec<usize>, Vec<f32>);
 
 /// Compares the kept runs of a method with the reference.
-fn measure((subject, plan): &(Subject, Plan), truth: &Truth, store: &Store, options: &Options) -> Result<Measurements, String> {
+fn measure(
+    (subject, plan): &(Subject, Plan),
+    truth: &Truth,
+    store: &Store,
+    options: &Options,
+) -> Result<Measurements, String> {
     let (mut points, mut picture) = (Vec::new(), Vec::new());
     for &spp in &plan.counts {
         let (mut seeds, mut point) = (Seeds::default(), Point { spp, ..Point::default() });

@@ -4,7 +4,9 @@ use super::method::Method;
 use super::truth::Truth;
 use super::{Options, machine};
 use lucerna_core::stats::chi2::sidak;
-use lucerna_core::stats::metrics::{EPSILON, Errors, FIREFLY, Interval, TRIMMED, efficiency, log_slope, standard_error};
+use lucerna_core::stats::metrics::{
+    EPSILON, Errors, FIREFLY, Interval, TRIMMED, efficiency, log_slope, standard_error,
+};
 use lucerna_core::stats::student::two_sided_p;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
