@@ -68,7 +68,7 @@ pub struct Arguments {
     reference: Option<PathBuf>,
 
     /// The method that renders the reference
-    #[arg(long, value_name = "METHOD", default_value = "path", conflicts_with = "reference")]
+    #[arg(long, value_name = "METHOD", default_value = "path:sampler=sobol", conflicts_with = "reference")]
     reference_method: String,
 
     /// Seconds that the reference may take, if its noise does not fall below a tenth of the best method's error before
@@ -208,7 +208,10 @@ fn print(result: &SceneResult, options: &Options) {
                     point.spp,
                     point.time().value,
                     point.mean(|e| e.rel_mse).value,
-                    result.gain(i, budget, |e| e.mse).map_or_else(|| "-".to_owned(), |g| page::times(&g)),
+                    match result.gain(i, budget, |e| e.rel_mse) {
+                        _ if i == result.baseline => "1 × (baseline)".to_owned(),
+                        gain => gain.map_or_else(|| "-".to_owned(), |g| page::times(&g)),
+                    },
                     percent(&point.mean_difference(&result.truth)),
                     if result.is_biased(point) == Some(true) { " (biased)" } else { "" },
                 ),
