@@ -74,7 +74,7 @@ fn python(scene: &Path) -> Result<&'static Python, Refusal> {
             }
         }
         Err(format!(
-            "there is no stored reference, and no Python with the package mitsuba was found (pip install mitsuba; {VARIABLE} names the interpreter)"
+            "the package mitsuba is needed, and no Python that has it was found (pip install mitsuba; {VARIABLE} names the interpreter)"
         ))
     });
     found.as_ref().map_err(|e| Refusal::Failed(e.clone()))
