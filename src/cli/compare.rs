@@ -26,7 +26,8 @@ Methods: `path`, `direct`, `path:max_depth=4`, `path:sampler=sobol`, `scene` (as
     define = { power = \"2\" }            # the scene's $power
     # renderer = \"mitsuba:scalar_rgb\"
 
-What a method does not name stays as the scene has it. The first method is the baseline, unless a file or --baseline says
+What a method does not name stays as the scene has it; a sampler of the scene that the reference renderer does not have is
+replaced by `independent` for it. The first method is the baseline, unless a file or --baseline says
 otherwise. Runs are kept in the report's folder: the same command again continues where it was.
 
 Exit codes: 0 done; 2 a method or a scene failed (the report tells of the others), or nothing could be compared";

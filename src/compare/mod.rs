@@ -117,10 +117,12 @@ fn rate(subject: &Subject, seconds: f64) -> Result<f64, String> {
     loop {
         let shot = subject.render(&[subject.counts_up_to(spp as u32)], u32::MAX)?.pop().ok_or("no picture")?;
         let took = shot.seconds.max(1e-6);
-        if took >= 0.5 * seconds || spp >= MOST {
+        // Four times as many, at least, are another number for samplers that round to powers of four, too.
+        let next = (f64::from(shot.spp) * (seconds / took).clamp(4.0, 32.0)).min(MOST);
+        if took >= 0.5 * seconds || subject.counts_up_to(next as u32) <= shot.spp {
             return Ok(f64::from(shot.spp) / took);
         }
-        spp = (f64::from(shot.spp) * (seconds / took).clamp(2.0, 32.0)).min(MOST);
+        spp = next;
     }
 }
 

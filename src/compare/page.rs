@@ -53,7 +53,7 @@ pub fn write(
             put(&format!("data/{name}.js"), &format!("LUCERNA_PICTURE(\"{name}\", \"{}\");\n", floats(scene, values)))?;
         }
         list.push(json!({
-            "name": scene.scene,
+            "name": scene.scene.display().to_string(),
             "size": scene.truth.size,
             "exposure": exposure(&picture(scene, &scene.truth.values)),
             "images": shown.iter().map(|(name, _)| name).collect::<Vec<_>>(),

@@ -161,7 +161,7 @@ pub fn to_json(scenes: &[SceneResult], failed: &[(PathBuf, String)], options: &O
         "confidence": 1.0 - Interval::MISS,
         "definitions": { "epsilon": EPSILON, "trimmed": TRIMMED, "firefly": FIREFLY },
         "scenes": scenes.iter().map(|scene| scene_json(scene, options)).collect::<Vec<_>>(),
-        "failed_scenes": failed.iter().map(|(scene, why)| json!({ "scene": scene, "failed": why })).collect::<Vec<_>>(),
+        "failed_scenes": failed.iter().map(|(scene, why)| json!({ "scene": scene.display().to_string(), "failed": why })).collect::<Vec<_>>(),
     })
 }
 
@@ -192,7 +192,7 @@ fn scene_json(scene: &SceneResult, options: &Options) -> Value {
         value
     });
     json!({
-        "scene": scene.scene,
+        "scene": scene.scene.display().to_string(),
         "size": truth.size,
         "reference": {
             "source": truth.source,

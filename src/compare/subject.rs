@@ -5,7 +5,7 @@ use super::{Options, Shot};
 use crate::check::key::{digest, scene_hash};
 use crate::check::reference;
 use lucerna_core::image::Image;
-use lucerna_core::render::{Budget, Control, RenderContext};
+use lucerna_core::render::{Budget, Control, FilmStore, RenderContext};
 use lucerna_core::scene::write::{WriteOptions, to_xml};
 use lucerna_core::scene::{
     ObjectKind, Parameter, Registry, Scene, SceneErrors, Value, instantiate, resolve, upgrade, xml,
@@ -14,6 +14,9 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::time::Instant;
+
+/// Memory of the largest picture in MiB, as of `render`.
+const MOST_MIB: u64 = 16_384;
 
 /// A scene, changed by a method and ready to be rendered.
 pub struct Subject {
@@ -80,6 +83,13 @@ impl Subject {
         if scene.integrator().is_none() && peer.is_none() {
             return Err("the scene has no integrator".to_owned());
         }
+        let film = scene.sensors()[0].film.settings().crop_size;
+        let needed = FilmStore::bytes(film, scene.integrator().map_or(0, |i| i.aov_names().len())) >> 20;
+        if needed > MOST_MIB {
+            return Err(format!(
+                "the picture needs {needed} MiB, the limit is {MOST_MIB} MiB (--size makes it smaller)"
+            ));
+        }
         let renderer = match &peer {
             Some(peer) => format!("{} {}", peer.variant, reference::version(path)?),
             None => program().to_owned(),
@@ -132,11 +142,11 @@ impl Subject {
         let started = Instant::now();
         let budget = Budget::Samples(spp);
         let mut cx = RenderContext::new(&self.scene, camera, budget, seed, &control, integrator.aov_names());
-        let report = integrator.render(&mut cx).map_err(|e| joined(&e.0))?;
+        integrator.render(&mut cx).map_err(|e| joined(&e.0))?;
         let seconds = started.elapsed().as_secs_f64();
         let (channels, data) = cx.store.develop(&cx.film);
         let size = cx.store.size();
-        Ok(Shot { spp: report.spp, seconds, image: Image { width: size.x, height: size.y, channels, data } })
+        Ok(Shot { spp, seconds, image: Image { width: size.x, height: size.y, channels, data } })
     }
 }
 
