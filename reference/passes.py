@@ -3,12 +3,13 @@
 Alone, it reads one job from standard input, as JSON:
 
     {"scene": FILE, "variant": NAME or "", "defines": {NAME: VALUE}, "size": [W, H] or null,
-     "spp": N, "seeds": [S, ...]}
+     "spp": N or [N, ...], "seeds": [S, ...], "threads": N}
 
 (or an empty line, which asks for nothing but the version) and answers on standard output: one line of JSON with
 `mitsuba` (its version), `variant`, `width`, `height`, `channels`, `notes`, or with `error`; and for each seed a little-endian
 double (seconds) and the picture in float32, row-major from the top left corner, channels interleaved. An empty variant is
-the fastest one that works here.
+the fastest one that works here. `spp` is that of all pictures, or of each; in the second case time matters, and what took
+less than two seconds is rendered twice, the second time without compiling. `threads` may be left out.
 """
 import json
 import os
@@ -26,13 +27,13 @@ THREADS = 2  # the block size of small pictures depends on it
 class Job:
     """One scene, loaded with a variant; renders passes as float32 arrays of shape (H, W, C)."""
 
-    def __init__(self, scene, variant, defines, size=None, integrator=None):
+    def __init__(self, scene, variant, defines, size=None, integrator=None, threads=None):
         import mitsuba as mi
         mi.set_log_level(mi.LogLevel.Error)
         mi.set_variant(variant)
-        if variant.startswith("scalar"):
+        if threads or variant.startswith("scalar"):
             import drjit
-            drjit.set_thread_count(THREADS)
+            drjit.set_thread_count(threads or THREADS)
         self.mi, self.scene = mi, mi.load_file(str(scene), **defines)
         self.film = self.scene.sensors()[0].film()
         if size:
@@ -88,7 +89,7 @@ def open_job(job):
                 raise
             notes.append(f"{variant} does not work here ({str(error).splitlines()[0][:100]})")
             continue
-        return Job(job["scene"], variant, job["defines"], job["size"]), variant, notes
+        return Job(job["scene"], variant, job["defines"], job["size"], threads=job.get("threads")), variant, notes
 
 
 def serve():
@@ -107,12 +108,18 @@ def serve():
             return say(mitsuba=mi.__version__)
         job = json.loads(line)
         opened, variant, notes = open_job(job)
-        for index, seed in enumerate(job["seeds"]):
+        timed = isinstance(job["spp"], list)
+        counts = job["spp"] if timed else [job["spp"]] * len(job["seeds"])
+        for index, (spp, seed) in enumerate(zip(counts, job["seeds"])):
             if index == 0 and not variant.startswith("scalar"):
                 opened.render(1, 999_999)  # compiles, which is not rendering time
             started = time.perf_counter()
-            image = opened.render_in_parts(job["spp"], seed)
+            image = opened.render_in_parts(spp, seed)
             seconds = time.perf_counter() - started
+            if timed and seconds < 2:
+                started = time.perf_counter()
+                image = opened.render_in_parts(spp, seed)
+                seconds = time.perf_counter() - started
             if index == 0:
                 say(mitsuba=mi.__version__, variant=variant, width=image.shape[1], height=image.shape[0],
                     channels=opened.channels(), notes=notes)

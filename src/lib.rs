@@ -13,6 +13,8 @@
 
 pub mod check;
 mod cli;
+pub mod compare;
+mod short_form;
 
 pub use lucerna_core as core;
 pub use lucerna_plugins as plugins;

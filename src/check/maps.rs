@@ -94,14 +94,14 @@ fn shown(image: &Image) -> [usize; 3] {
 }
 
 /// A factor that makes a picture neither too dark nor too bright to look at.
-fn exposure(image: &Image) -> f32 {
+pub(crate) fn exposure(image: &Image) -> f32 {
     let channels = shown(image);
     let pixels = image.data.chunks_exact(image.channels.len());
     let bright = quantile(pixels.map(|p| channels.map(|c| p[c]).into_iter().fold(0.0, f32::max)), 0.95);
     if (0.2..=1.2).contains(&bright) || bright <= 0.0 { 1.0 } else { 0.8 / bright }
 }
 
-fn exposed(image: &Image, factor: f32) -> Image {
+pub(crate) fn exposed(image: &Image, factor: f32) -> Image {
     map(image, |rgb| rgb.map(|v| v * factor))
 }
 

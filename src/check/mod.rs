@@ -119,6 +119,13 @@ impl Refusal {
     pub fn failed(message: impl std::fmt::Display) -> Self {
         Refusal::Failed(message.to_string())
     }
+
+    /// The reason.
+    pub fn text(&self) -> String {
+        match self {
+            Refusal::NotForUs(text) | Refusal::Failed(text) => text.clone(),
+        }
+    }
 }
 
 /// What was measured of a scene.

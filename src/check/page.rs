@@ -233,7 +233,7 @@ fn marks(findings: &Findings, [width, height]: [u32; 2]) -> String {
     format!("<svg viewBox=\"0 0 {width} {height}\">{frames}</svg>")
 }
 
-fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 

@@ -74,7 +74,7 @@ fn python(scene: &Path) -> Result<&'static Python, Refusal> {
             }
         }
         Err(format!(
-            "there is no stored reference, and no Python with the package mitsuba was found (pip install mitsuba; {VARIABLE} names the interpreter)"
+            "the package mitsuba is needed, and no Python that has it was found (pip install mitsuba; {VARIABLE} names the interpreter)"
         ))
     });
     found.as_ref().map_err(|e| Refusal::Failed(e.clone()))
@@ -115,7 +115,8 @@ impl Drop for Running {
 /// What the interpreter answered.
 struct Answer {
     images: Vec<Image>,
-    seconds: f64,
+    /// Seconds of each.
+    times: Vec<f64>,
     variant: String,
     notes: Vec<String>,
 }
@@ -143,17 +144,53 @@ fn render(python: &Python, job: &Value, seeds: usize, size: [u32; 2]) -> Result<
     };
     let channels = strings("channels");
     let values = width as usize * height as usize * channels.len();
-    let (mut images, mut seconds) = (Vec::new(), 0.0);
+    let (mut images, mut times) = (Vec::new(), Vec::new());
     for _ in 0..seeds {
         let mut bytes = vec![0; 8 + 4 * values];
         output.read_exact(&mut bytes).map_err(|_| "the reference renderer ended early".to_owned())?;
         let (time, data) = bytes.split_at(8);
-        seconds += time.try_into().map_or(0.0, f64::from_le_bytes);
+        times.push(time.try_into().map_or(0.0, f64::from_le_bytes));
         let data = data.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
         images.push(Image { width, height, channels: channels.clone(), data });
     }
     let variant = head["variant"].as_str().unwrap_or_default().to_owned();
-    Ok(Answer { images, seconds, variant, notes: strings("notes") })
+    Ok(Answer { images, times, variant, notes: strings("notes") })
+}
+
+/// The version of the package.
+///
+/// # Errors
+/// If there is none.
+pub(crate) fn version(scene: &Path) -> Result<String, String> {
+    python(scene).map(|python| python.version.clone()).map_err(|refusal| refusal.text())
+}
+
+/// Renders a scene that is given as text for the reference: one picture for each number of samples per pixel, all with one
+/// seed, and the seconds of each.
+///
+/// # Errors
+/// If there is no package, or it cannot render the scene.
+pub(crate) fn render_text(
+    scene: &Path,
+    text: &str,
+    variant: &str,
+    counts: &[u32],
+    seed: u32,
+    size: [u32; 2],
+) -> Result<Vec<(Image, f64)>, String> {
+    let python = python(scene).map_err(|refusal| refusal.text())?;
+    let file = TemporaryFile::new(text).map_err(|refusal| refusal.text())?;
+    let job = json!({
+        "scene": file.1,
+        "variant": variant,
+        "defines": {},
+        "size": null,
+        "spp": counts,
+        "seeds": vec![seed; counts.len()],
+        "threads": rayon::current_num_threads(),
+    });
+    let answer = render(python, &job, counts.len(), size)?;
+    Ok(answer.images.into_iter().zip(answer.times).collect())
 }
 
 /// A way to hand the scene to the reference.
@@ -237,7 +274,7 @@ pub fn measure(ours: &Ours, options: &Options, spp: u32, seed: u32) -> Result<Re
     let mut reference = Reference {
         measured,
         spp,
-        seconds: answer.seconds,
+        seconds: answer.times.iter().sum(),
         mitsuba: python.version.clone(),
         tabulated: answer.variant.starts_with("scalar"),
         variant: answer.variant,
@@ -257,7 +294,7 @@ pub fn measure(ours: &Ours, options: &Options, spp: u32, seed: u32) -> Result<Re
 pub fn exact(ours: &Ours, options: &Options, spp: u32) -> Result<(Image, f64), Refusal> {
     let (_, mut answer) = render_scene(ours, options, "scalar_rgb", spp, &[options.seed])?;
     let image = answer.images.pop().ok_or_else(|| Refusal::failed("the reference gave no picture"))?;
-    Ok((image, answer.seconds))
+    Ok((image, answer.times.iter().sum()))
 }
 
 /// Everything a reference depends on.

@@ -1,6 +1,7 @@
 //! The command line: one file per subcommand.
 
 mod check;
+mod compare;
 mod convert;
 mod info;
 mod plugins;
@@ -8,12 +9,13 @@ mod progress;
 mod render;
 mod scene_args;
 
+use crate::short_form::key_value;
 use clap::{Parser, Subcommand};
 use lucerna_core::scene::Registry;
 use std::process::ExitCode;
 
 /// Told at the end of the help.
-const EXIT_CODES: &str = "Exit codes: 0 done; 1 a scene differs (check); 2 could not run (arguments, scene or output); 3 bad samples under --strict-nan";
+const EXIT_CODES: &str = "Exit codes: 0 done; 1 a scene differs (check); 2 could not run (arguments, scene, output, or a compared method); 3 bad samples under --strict-nan";
 
 /// Exit code of a run that could not be done.
 const FAILURE: u8 = 2;
@@ -31,6 +33,8 @@ enum Command {
     Render(Box<render::Arguments>),
     /// Compare scenes with the reference renderer
     Check(Box<check::Arguments>),
+    /// Compare speed against error of integrators, samplers and settings
+    Compare(Box<compare::Arguments>),
     /// Write an old scene in today's language
     Convert(convert::Arguments),
     /// List plugins, or the parameters of one
@@ -61,6 +65,7 @@ pub fn run(registry: &Registry) -> ExitCode {
     let done = match arguments.command {
         Command::Render(arguments) => render::run(registry, &arguments),
         Command::Check(arguments) => check::run(registry, &arguments),
+        Command::Compare(arguments) => compare::run(registry, &arguments),
         Command::Convert(arguments) => convert::run(&arguments),
         Command::Plugins(arguments) => plugins::run(registry, &arguments),
         Command::Info(arguments) => info::run(registry, &arguments),
@@ -76,12 +81,4 @@ fn set_threads(threads: Option<u16>) -> Result<(), Failure> {
     let Some(threads) = threads else { return Ok(()) };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
     pool.build_global().map_err(|e| Failure::new(format!("cannot start {threads} threads: {e}")))
-}
-
-/// `key=value` of an option.
-fn key_value(text: &str) -> Result<(String, String), String> {
-    match text.split_once('=') {
-        Some((key, value)) if !key.is_empty() => Ok((key.to_owned(), value.to_owned())),
-        _ => Err("expected name=value".to_owned()),
-    }
 }

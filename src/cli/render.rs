@@ -1,16 +1,15 @@
 //! `lucerna render`: a scene to a picture.
 
+use super::Failure;
 use super::progress::Bar;
 use super::scene_args::{SceneArguments, default_output};
-use super::{Failure, key_value};
+use crate::short_form;
 use clap::Args;
 use lucerna_core::image::{self, Image, exr, png};
 use lucerna_core::interfaces::{ComponentFormat, FileFormat, Integrator};
 use lucerna_core::math::UVec2;
 use lucerna_core::render::{Budget, Control, FilmStore, RenderContext, Report, SampleOrder, replay};
-use lucerna_core::scene::{
-    BuiltSensor, Description, Location, Node, Object, ObjectKind, Parameter, Registry, Scene, Value, build_one,
-};
+use lucerna_core::scene::{BuiltSensor, Description, Object, ObjectKind, Parameter, Registry, Scene, Value, build_one};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -106,7 +105,7 @@ fn numbers<const N: usize>(text: &str) -> Result<[u32; N], String> {
     list.ok().and_then(|list| list.try_into().ok()).ok_or_else(|| format!("expected {N} whole numbers"))
 }
 
-fn size(text: &str) -> Result<[u32; 2], String> {
+pub fn size(text: &str) -> Result<[u32; 2], String> {
     numbers(&text.replace('x', ","))
 }
 
@@ -193,7 +192,7 @@ fn camera(registry: &Registry, scene: &Scene, arguments: &Arguments) -> Result<B
         _ => Failure::new(format!("there is no sensor {}: the scene has {count}, counted from 0", arguments.sensor)),
     })?;
     if let Some(text) = &arguments.sampler {
-        let node = short_form(ObjectKind::Sampler, text)?;
+        let node = short_form::parse(ObjectKind::Sampler, text, "--sampler").map_err(Failure::new)?;
         if let Object::Sampler(sampler) = build_one(registry, &Description::of(node))? {
             camera.sampler = sampler;
         }
@@ -389,7 +388,7 @@ fn peak_memory() -> Option<u64> {
 
 /// Puts an object from the command line in the place of the scene's own.
 fn replace_child(description: &mut Description, kind: ObjectKind, text: &str) -> Result<(), Failure> {
-    let node = short_form(kind, text)?;
+    let node = short_form::parse(kind, text, &format!("--{}", kind.tag())).map_err(Failure::new)?;
     let at = node.at.clone();
     let id = description.add(node);
     let root = description.root;
@@ -402,30 +401,4 @@ fn replace_child(description: &mut Description, kind: ObjectKind, text: &str) ->
     parameters.retain(|p| !old.contains(&p.name));
     parameters.push(Parameter { name: format!("_{}", kind.tag()), value: Value::Object(id), at });
     Ok(())
-}
-
-/// `name` or `name:parameter=value,parameter=value` as a node.
-fn short_form(kind: ObjectKind, text: &str) -> Result<Node, Failure> {
-    let (plugin, rest) = text.split_once(':').unwrap_or((text, ""));
-    let at = Location::file(format!("--{}", kind.tag()));
-    let mut parameters = Vec::new();
-    for item in rest.split(',').filter(|item| !item.is_empty()) {
-        let (name, value) =
-            key_value(item).map_err(|e| Failure::new(format!("--{} {text}: \"{item}\": {e}", kind.tag())))?;
-        parameters.push(Parameter { name, value: plain_value(&value), at: at.clone() });
-    }
-    Ok(Node { kind, plugin: plugin.to_owned(), id: None, parameters, at, included_from: Vec::new() })
-}
-
-/// A value of the command line: the narrowest type it can be.
-fn plain_value(text: &str) -> Value {
-    if let Ok(v) = text.parse::<i64>() {
-        Value::Integer(v)
-    } else if let Ok(v) = text.parse::<f64>() {
-        Value::Float(v)
-    } else if let Ok(v) = text.parse::<bool>() {
-        Value::Boolean(v)
-    } else {
-        Value::String(text.to_owned())
-    }
 }

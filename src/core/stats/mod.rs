@@ -5,6 +5,7 @@ pub mod chi2;
 pub mod figures;
 pub mod images;
 mod measured;
+pub mod metrics;
 pub mod student;
 
 pub use measured::{Measured, TILE};

@@ -1,0 +1,260 @@
+//! A method: a name and what it changes in a scene. Whatever it does not name stays as the scene has it.
+
+use crate::short_form::{parse, plain_value};
+use lucerna_core::scene::{Description, Location, Node, ObjectKind, Parameter, Registry, Value};
+use serde::Deserialize;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+/// What is compared.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Method {
+    /// Its name, unique in a comparison.
+    pub name: String,
+    /// The variant of the reference renderer that renders it; Lucerna if none.
+    pub variant: Option<String>,
+    /// Another integrator.
+    pub integrator: Option<Node>,
+    /// Another sampler.
+    pub sampler: Option<Node>,
+    /// Values for the scene's `$name`.
+    pub defines: Vec<(String, String)>,
+}
+
+/// The methods of a comparison.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Methods {
+    /// In the order they take turns.
+    pub list: Vec<Method>,
+    /// The one that others are measured by.
+    pub baseline: Option<String>,
+}
+
+/// A file of methods.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    baseline: Option<String>,
+    method: Vec<Entry>,
+}
+
+/// One `[[method]]` of a file.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entry {
+    name: String,
+    renderer: Option<String>,
+    integrator: Option<String>,
+    sampler: Option<String>,
+    #[serde(default)]
+    parameters: BTreeMap<String, toml::Value>,
+    #[serde(default)]
+    define: BTreeMap<String, String>,
+}
+
+impl Methods {
+    /// Of short forms, and of files whose name ends in `.toml`.
+    ///
+    /// # Errors
+    /// If one cannot be read, or two have the same name; one line.
+    pub fn parse(texts: &[String]) -> Result<Self, String> {
+        let (mut list, mut baseline) = (Vec::new(), None);
+        for text in texts {
+            if Path::new(text).extension().is_some_and(|e| e == "toml") {
+                let failed = |e: &dyn std::fmt::Display| format!("{text}: {}", e.to_string().replace('\n', " "));
+                let content = std::fs::read_to_string(text).map_err(|e| failed(&e))?;
+                let file: File = toml::from_str(&content).map_err(|e| failed(&located(&content, &e)))?;
+                baseline = file.baseline.or(baseline);
+                for entry in file.method {
+                    list.push(Method::of_entry(entry).map_err(|e| failed(&e))?);
+                }
+            } else {
+                list.push(Method::of_text(text)?);
+            }
+        }
+        let mut names = BTreeSet::new();
+        if let Some(twice) = list.iter().find(|m| !names.insert(m.name.clone())) {
+            return Err(format!("two methods are called \"{}\"", twice.name));
+        }
+        match baseline.as_ref().filter(|name| !names.contains(*name)) {
+            Some(name) => Err(format!("no method is called \"{name}\", the baseline")),
+            None if list.is_empty() => Err("there is no method to compare".to_owned()),
+            None => Ok(Methods { list, baseline }),
+        }
+    }
+}
+
+/// Line and message of a mistake in a file.
+fn located(content: &str, error: &toml::de::Error) -> String {
+    let line = error.span().map(|span| 1 + content[..span.start.min(content.len())].matches('\n').count());
+    line.map_or_else(|| error.message().to_owned(), |line| format!("line {line}: {}", error.message()))
+}
+
+impl Method {
+    /// Of a short form: `path`, `path:max_depth=4,sampler=sobol`, `scene`, `mitsuba:llvm_ad_rgb:path`.
+    ///
+    /// # Errors
+    /// If it is none.
+    pub fn of_text(text: &str) -> Result<Self, String> {
+        let (variant, rest) = match text.strip_prefix("mitsuba:") {
+            Some(rest) => {
+                let (variant, rest) = rest.split_once(':').unwrap_or((rest, "scene"));
+                (Some(variant.to_owned()), rest)
+            }
+            None => (None, text),
+        };
+        let mut node = parse(ObjectKind::Integrator, rest, "--methods")?;
+        let sampler = match node.take("sampler").map(|p| p.value) {
+            Some(Value::String(name)) => Some(parse(ObjectKind::Sampler, &name, "--methods")?),
+            Some(_) => return Err(format!("--methods {text}: sampler must be the name of one")),
+            None => None,
+        };
+        let names = variant.iter().chain([&node.plugin]).chain(sampler.iter().map(|s| &s.plugin));
+        if !names.into_iter().all(|name| is_name(name)) {
+            return Err(format!(
+                "--methods {text}: expected scene, INTEGRATOR, INTEGRATOR:parameter=value,sampler=NAME, mitsuba:VARIANT:INTEGRATOR, or a .toml file"
+            ));
+        }
+        if node.plugin == "scene" && !node.parameters.is_empty() {
+            return Err(format!("--methods {text}: \"scene\" takes no parameters but sampler"));
+        }
+        let integrator = (node.plugin != "scene").then_some(node);
+        Ok(Method { name: text.to_owned(), variant, integrator, sampler, defines: Vec::new() })
+    }
+
+    fn of_entry(entry: Entry) -> Result<Self, String> {
+        let mut text = entry.integrator.unwrap_or_else(|| "scene".to_owned());
+        if let Some(renderer) = &entry.renderer {
+            text = format!("{renderer}:{text}");
+        }
+        let mut method = Method::of_text(&text)?;
+        if let Some(sampler) = entry.sampler {
+            method.sampler = Some(parse(ObjectKind::Sampler, &sampler, "sampler")?);
+        }
+        if !entry.parameters.is_empty() {
+            let node = method.integrator.as_mut().ok_or("parameters need an integrator")?;
+            for (name, value) in entry.parameters {
+                let value = match value {
+                    toml::Value::String(text) => Value::String(text),
+                    other => plain_value(&other.to_string()),
+                };
+                let _ = node.take(&name);
+                node.parameters.push(Parameter { name, value, at: node.at.clone() });
+            }
+        }
+        method.name = entry.name;
+        method.defines = entry.define.into_iter().collect();
+        Ok(method)
+    }
+
+    /// What it is, in one line.
+    pub fn describe(&self) -> String {
+        let short = |node: &Node| {
+            let values = node.parameters.iter().map(|p| format!("{}={}", p.name, plain_text(&p.value)));
+            let values = values.collect::<Vec<_>>().join(",");
+            if values.is_empty() { node.plugin.clone() } else { format!("{}:{values}", node.plugin) }
+        };
+        let mut parts = vec![self.variant.as_ref().map_or("Lucerna".to_owned(), |v| format!("mitsuba {v}"))];
+        parts.push(self.integrator.as_ref().map_or("the scene's integrator".to_owned(), short));
+        parts.extend(self.sampler.as_ref().map(|s| format!("sampler {}", short(s))));
+        parts.extend(self.defines.iter().map(|(name, value)| format!("${name} = {value}")));
+        parts.join(", ")
+    }
+
+    /// Changes a scene. The integrator's parameters that the scene gives stay, if the method does not give them and they
+    /// have a meaning for its integrator; the number of samples per pixel belongs to the comparison.
+    pub fn apply(&self, description: &mut Description, registry: &Registry) {
+        let root = description.root;
+        if let Some(wanted) = &self.integrator {
+            replace(description, root, wanted, registry);
+        }
+        if let Some(wanted) = &self.sampler {
+            let is_sensor = |node: &Node| node.kind == ObjectKind::Sensor;
+            let sensors: Vec<_> =
+                (description.children(root).map(|(_, id)| id)).filter(|id| is_sensor(description.node(*id))).collect();
+            for sensor in sensors {
+                replace(description, sensor, wanted, registry);
+            }
+        }
+    }
+}
+
+/// Puts an object in the place of the parent's own of that kind, whose parameters it takes over.
+fn replace(description: &mut Description, parent: lucerna_core::scene::NodeId, wanted: &Node, registry: &Registry) {
+    let mut node = wanted.clone();
+    let old: Vec<_> = (description.children(parent))
+        .filter(|(_, child)| description.node(*child).kind == wanted.kind)
+        .map(|(parameter, child)| (parameter.name.clone(), child))
+        .collect();
+    let known = registry.find(wanted.kind, &wanted.plugin);
+    for (_, child) in &old {
+        let before = description.node(*child);
+        let same = before.plugin == wanted.plugin;
+        let stays = |p: &&Parameter| {
+            let has_meaning = same || known.is_some_and(|plugin| plugin.param(&p.name).is_some());
+            has_meaning && node.parameter(&p.name).is_none() && (same || !matches!(p.value, Value::Object(_)))
+        };
+        let kept: Vec<Parameter> = before.parameters.iter().filter(stays).cloned().collect();
+        node.parameters.extend(kept);
+    }
+    let at = Location::file("--methods".to_owned());
+    let name = format!("_{}", wanted.kind.tag());
+    let id = description.add(node);
+    let parameters = &mut description.node_mut(parent).parameters;
+    parameters.retain(|p| !old.iter().any(|(name, _)| *name == p.name));
+    parameters.push(Parameter { name, value: Value::Object(id), at });
+}
+
+fn plain_text(value: &Value) -> String {
+    match value {
+        Value::Integer(v) => v.to_string(),
+        Value::Float(v) => v.to_string(),
+        Value::Boolean(v) => v.to_string(),
+        Value::String(v) => v.clone(),
+        other => other.type_name().to_owned(),
+    }
+}
+
+fn is_name(text: &str) -> bool {
+    !text.is_empty() && text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn short_forms() {
+        let method = Method::of_text("path:max_depth=4,sampler=sobol").unwrap();
+        assert_eq!(method.describe(), "Lucerna, path:max_depth=4, sampler sobol");
+        let peer = Method::of_text("mitsuba:llvm_ad_rgb:path").unwrap();
+        assert_eq!(peer.describe(), "mitsuba llvm_ad_rgb, path");
+        assert_eq!(Method::of_text("scene").unwrap().integrator, None);
+        for wrong in ["", "path:max_depth", "a b", "mitsuba:", "scene:max_depth=3", "path:sampler=3"] {
+            let message = Method::of_text(wrong).unwrap_err();
+            assert!(message.starts_with("--methods") && !message.contains('\n'), "{message}");
+        }
+    }
+
+    #[test]
+    fn names_are_unique() {
+        let texts = ["path".to_owned(), "path".to_owned()];
+        assert_eq!(Methods::parse(&texts).unwrap_err(), "two methods are called \"path\"");
+        assert!(Methods::parse(&[]).is_err());
+    }
+
+    #[test]
+    fn a_method_keeps_what_it_does_not_name() {
+        let xml = r#"<scene version="3.0.0"><integrator type="path"><integer name="max_depth" value="6"/></integrator></scene>"#;
+        for (text, depth) in [("path", Some(6)), ("path:max_depth=3", Some(3)), ("volpath", Some(6)), ("direct", None)]
+        {
+            let mut scene = lucerna_core::scene::xml::load_str(xml, "t.xml", &Default::default()).unwrap();
+            Method::of_text(text).unwrap().apply(&mut scene, &crate::builtin());
+            let integrators = scene.children(scene.root).map(|(_, id)| scene.node(id));
+            let all: Vec<&Node> = integrators.filter(|node| node.kind == ObjectKind::Integrator).collect();
+            assert_eq!(all.len(), 1);
+            let found = all[0].parameter("max_depth").map(|p| p.value.clone());
+            assert_eq!(found, depth.map(Value::Integer), "{text}");
+        }
+    }
+}

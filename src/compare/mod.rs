@@ -1,0 +1,301 @@
+//! Speed against error: which method gives a better picture of a scene in the same time?
+//!
+//! **Turns.** For each seed, each method renders the scene: A B C, A B C, …; what slows the machine for a while then
+//! slows all, and ratios are taken between runs that stood next to each other. All use the same number of threads.
+//!
+//! **Points.** Each run renders the picture with 1, 2, 4, … samples per pixel up to the budget, every one from the
+//! beginning, with a clock of its own: that makes the curves, costs about as much again as the last one, and is fair to samplers that
+//! stratify a number of points they have to know at the start. A budget in seconds becomes a number of samples per
+//! pixel, once for each method; the time that was in fact taken is what counts.
+//!
+//! **Reference.** Given, or rendered until its noise does not matter ([`truth`]).
+//!
+//! **Numbers.** [`lucerna_core::stats::metrics`]; intervals are Student's over the seeds ([`results`]). Every run is
+//! kept ([`store`]).
+
+pub mod method;
+pub mod page;
+pub mod plot;
+pub mod results;
+pub mod store;
+pub mod subject;
+pub mod truth;
+
+use lucerna_core::image::Image;
+use lucerna_core::scene::{Registry, xml};
+use lucerna_core::stats::metrics::{Seeds, errors};
+use method::{Method, Methods};
+use results::{MethodResult, Point, SceneResult};
+use std::path::{Path, PathBuf};
+use store::Store;
+use subject::Subject;
+use truth::Truth;
+
+/// How long a run may take.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Budgets {
+    /// Samples per pixel.
+    Samples(Vec<u32>),
+    /// Seconds.
+    Seconds(Vec<f64>),
+}
+
+impl Budgets {
+    /// Each in words.
+    pub fn names(&self) -> Vec<String> {
+        match self {
+            Budgets::Samples(list) => list.iter().map(|spp| format!("{spp} spp")).collect(),
+            Budgets::Seconds(list) => list.iter().map(|seconds| format!("{seconds} s")).collect(),
+        }
+    }
+}
+
+/// How to compare.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// How scenes are read.
+    pub reading: xml::LoadOptions,
+    /// Another picture size.
+    pub size: Option<[u32; 2]>,
+    /// Rising.
+    pub budgets: Budgets,
+    /// Runs of each method.
+    pub seeds: u32,
+    /// The first seed.
+    pub seed: u32,
+    /// Only render what the budgets name, not the points before.
+    pub no_curves: bool,
+    /// A given reference.
+    pub reference: Option<PathBuf>,
+    /// What renders it else, in short form.
+    pub reference_method: String,
+    /// Seconds it may take at most.
+    pub reference_seconds: f64,
+    /// Where rendered references are kept.
+    pub cache: PathBuf,
+    /// The folder of the report.
+    pub output: PathBuf,
+}
+
+/// A picture and the time it took.
+#[derive(Clone, Debug)]
+pub struct Shot {
+    /// Samples per pixel.
+    pub spp: u32,
+    /// Seconds of rendering.
+    pub seconds: f64,
+    /// The picture.
+    pub image: Image,
+}
+
+/// The processor, as the system calls it.
+pub fn machine() -> String {
+    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let line = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
+    line.map_or_else(|| std::env::consts::ARCH.to_owned(), |(_, name)| name.trim().to_owned())
+}
+
+/// The channels that are compared: colour, else brightness, and their values.
+///
+/// # Errors
+/// If there are neither.
+pub fn colour(image: &Image) -> Result<(Vec<String>, Vec<f32>), String> {
+    let pick = |names: &[&str]| -> Option<(Vec<String>, Vec<usize>)> {
+        let order = names.iter().map(|name| image.channel(name)).collect::<Option<Vec<_>>>()?;
+        Some((names.iter().map(|&name| name.to_owned()).collect(), order))
+    };
+    let found = pick(&["R", "G", "B"]).or_else(|| pick(&["Y"]));
+    let (names, order) = found.ok_or("the picture has neither channels R, G, B nor Y")?;
+    let pixels = image.data.chunks_exact(image.channels.len());
+    Ok((names, pixels.flat_map(|pixel| order.iter().map(|&c| pixel[c])).collect()))
+}
+
+/// Samples per pixel a second, from a trial of about this many seconds.
+fn rate(subject: &Subject, seconds: f64) -> Result<f64, String> {
+    const MOST: f64 = (1 << 22) as f64;
+    let mut spp = 1.0;
+    loop {
+        let shot = subject.render(&[subject.counts_up_to(spp as u32)], u32::MAX)?.pop().ok_or("no picture")?;
+        let took = shot.seconds.max(1e-6);
+        // Four times as many, at least, are another number for samplers that round to powers of four, too.
+        let next = (f64::from(shot.spp) * (seconds / took).clamp(4.0, 32.0)).min(MOST);
+        if took >= 0.5 * seconds || subject.counts_up_to(next as u32) <= shot.spp {
+            return Ok(f64::from(shot.spp) / took);
+        }
+        spp = next;
+    }
+}
+
+/// One method in a scene, while runs are made.
+struct Contestant {
+    method: Method,
+    state: Result<(Subject, Plan), String>,
+}
+
+/// Numbers of samples per pixel, rising, and the ones among them that the budgets ask for.
+struct Plan {
+    counts: Vec<u32>,
+    stops: Vec<u32>,
+}
+
+fn plan(subject: &Subject, options: &Options, store: &Store) -> Result<Plan, String> {
+    let stops: Vec<u32> = match &options.budgets {
+        Budgets::Samples(list) => list.iter().map(|spp| subject.counts_up_to(*spp)).collect(),
+        Budgets::Seconds(list) => {
+            let names = options.budgets.names().join(" ");
+            match store.load_plan(&subject.key, &names).filter(|plan| plan.len() == list.len()) {
+                Some(known) => known,
+                None => {
+                    let shortest = list.iter().copied().fold(f64::INFINITY, f64::min);
+                    let rate = rate(subject, shortest.min(2.0) / 2.0)?;
+                    let counts = list.iter().map(|s| (rate * s).clamp(1.0, f64::from(1 << 24)) as u32);
+                    let counts: Vec<u32> = counts.map(|spp| subject.counts_up_to(spp)).collect();
+                    store.keep_plan(&subject.key, &names, &counts)?;
+                    counts
+                }
+            }
+        }
+    };
+    let most = stops.iter().copied().max().unwrap_or(1);
+    let mut counts = stops.clone();
+    if !options.no_curves {
+        let powers = (0..32).map(|i| 1_u32 << i).take_while(|spp| *spp < most);
+        counts.extend(powers.map(|spp| subject.counts_up_to(spp)));
+    }
+    counts.sort_unstable();
+    counts.dedup();
+    Ok(Plan { counts, stops })
+}
+
+/// Compares methods in one scene. `tell` hears of every run.
+///
+/// # Errors
+/// If nothing can be written, or there is no reference; one line. A method that fails is in the result.
+pub fn compare(
+    registry: &Registry,
+    scene: &Path,
+    methods: &Methods,
+    options: &Options,
+    tell: &mut dyn FnMut(String),
+) -> Result<SceneResult, String> {
+    let store = Store::open(options.output.join("runs"))?;
+    let mut contestants: Vec<Contestant> = Vec::new();
+    let mut size = None;
+    for method in &methods.list {
+        let state = Subject::load(registry, scene, method, options).and_then(|subject| {
+            let plan = plan(&subject, options, &store)?;
+            match *size.get_or_insert(subject.size()) == subject.size() {
+                true => Ok((subject, plan)),
+                false => Err("its picture has another size than those before".to_owned()),
+            }
+        });
+        if let Err(why) = &state {
+            tell(format!("{}: failed: {why}", method.name));
+        }
+        contestants.push(Contestant { method: method.clone(), state });
+    }
+    let none_works = |contestants: &[Contestant]| contestants.iter().all(|c| c.state.is_err());
+    let first_failure = |contestants: &[Contestant]| {
+        contestants.iter().find_map(|c| c.state.as_ref().err().cloned()).unwrap_or_default()
+    };
+    for run in 0..options.seeds {
+        take_turns(&mut contestants, &store, options.seed.wrapping_add(run), (run, options.seeds), tell)?;
+    }
+    let (Some(size), false) = (size, none_works(&contestants)) else {
+        return Err(format!("no method works: {}", first_failure(&contestants)));
+    };
+
+    let longest = |(subject, plan): &(Subject, Plan)| {
+        let spp = *plan.counts.last()?;
+        let shot = store.load(&subject.key, spp, options.seed)?;
+        Some((spp, colour(&shot.image).ok()?.1))
+    };
+    let pictures: Vec<(u32, Vec<f32>)> =
+        contestants.iter().filter_map(|c| c.state.as_ref().ok()).filter_map(longest).collect();
+    let truth = match &options.reference {
+        Some(path) => Truth::read(path, size)?,
+        None => {
+            let most = pictures.iter().map(|(spp, _)| *spp).max().unwrap_or(1);
+            let pictures: Vec<Vec<f32>> = pictures.into_iter().map(|(_, picture)| picture).collect();
+            truth::make(registry, scene, options, &pictures, most, tell).map_err(|e| format!("the reference: {e}"))?
+        }
+    };
+    let measured = contestants.into_iter().map(|contestant| {
+        let measured = contestant.state.and_then(|state| measure(&state, &truth, &store, options));
+        let (failed, (points, stops, picture)) = match measured {
+            Ok(found) => (None, found),
+            Err(why) => (Some(why), Default::default()),
+        };
+        MethodResult { method: contestant.method, failed, points, stops, picture }
+    });
+    let methods_found: Vec<MethodResult> = measured.collect();
+    let named = methods.baseline.as_ref().and_then(|name| methods.list.iter().position(|m| m.name == *name));
+    let baseline = named.unwrap_or_else(|| methods_found.iter().position(|m| m.failed.is_none()).unwrap_or(0));
+    Ok(SceneResult { scene: scene.to_owned(), truth, methods: methods_found, baseline })
+}
+
+/// One run of each method, with the same seed. What is kept is not rendered again.
+fn take_turns(
+    contestants: &mut [Contestant],
+    store: &Store,
+    seed: u32,
+    (run, runs): (u32, u32),
+    tell: &mut dyn FnMut(String),
+) -> Result<(), String> {
+    for Contestant { method, state } in contestants {
+        let Ok((subject, plan)) = &state else { continue };
+        let is_missing = |spp: &u32| store.load(&subject.key, *spp, seed).is_none();
+        let missing: Vec<u32> = plan.counts.iter().copied().filter(is_missing).collect();
+        if missing.is_empty() {
+            continue;
+        }
+        match subject.render(&missing, seed) {
+            Ok(shots) => {
+                for shot in &shots {
+                    store.keep(&subject.key, seed, shot)?;
+                }
+                let last = shots.last().map_or_else(String::new, |s| format!("{} spp, {:.2} s", s.spp, s.seconds));
+                tell(format!("run {} of {runs}, {}: {last}", run + 1, method.name));
+            }
+            Err(why) => {
+                tell(format!("{}: failed: {why}", method.name));
+                *state = Err(why);
+            }
+        }
+    }
+    Ok(())
+}
+
+type Measurements = (Vec<Point>, Vec<usize>, Vec<f32>);
+
+/// Compares the kept runs of a method with the reference.
+fn measure(
+    (subject, plan): &(Subject, Plan),
+    truth: &Truth,
+    store: &Store,
+    options: &Options,
+) -> Result<Measurements, String> {
+    let (mut points, mut picture) = (Vec::new(), Vec::new());
+    for &spp in &plan.counts {
+        let (mut seeds, mut point) = (Seeds::default(), Point { spp, ..Point::default() });
+        for run in 0..options.seeds {
+            let seed = options.seed.wrapping_add(run);
+            let shot = store.load(&subject.key, spp, seed).ok_or("a run that was kept cannot be read")?;
+            let (channels, values) = colour(&shot.image)?;
+            if channels != truth.channels {
+                return Err(format!("channels {} instead of {}", channels.join(" "), truth.channels.join(" ")));
+            }
+            point.errors.push(errors(&values, &truth.values, channels.len())?);
+            point.seconds.push(shot.seconds);
+            seeds.add(&values)?;
+            if run == 0 {
+                picture = values;
+            }
+        }
+        point.variance = seeds.variance();
+        point.bias_squared = seeds.bias_squared(&truth.values, truth.noise.map_or(0.0, |[mse, ..]| mse));
+        points.push(point);
+    }
+    let at = |spp: &u32| plan.counts.iter().position(|count| count == spp).unwrap_or(0);
+    Ok((points, plan.stops.iter().map(at).collect(), picture))
+}

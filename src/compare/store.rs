@@ -1,0 +1,79 @@
+//! What was rendered before: a folder with one EXR and one JSON file a run, named after the hash of all they depend on.
+//! A comparison that was killed continues with it, and one with more methods or seeds renders only what is new.
+
+use super::Shot;
+use crate::check::key::digest;
+use lucerna_core::image::{Image, ReadLimits, exr};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+/// The folder.
+pub struct Store(PathBuf);
+
+impl Store {
+    /// Opens it, or makes a new one.
+    ///
+    /// # Errors
+    /// If it cannot be written to.
+    pub fn open(folder: PathBuf) -> Result<Self, String> {
+        std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+        Ok(Store(folder))
+    }
+
+    /// A run, if it is there and whole.
+    pub fn load(&self, subject: &str, spp: u32, seed: u32) -> Option<Shot> {
+        let path = self.path(subject, &format!("{spp} {seed}"));
+        let about: Value = serde_json::from_slice(&std::fs::read(path.with_extension("json")).ok()?).ok()?;
+        let image = exr::read(&path.with_extension("exr"), &ReadLimits::default()).ok()?.image;
+        Some(Shot { spp, seconds: about["seconds"].as_f64()?, image })
+    }
+
+    /// Keeps a run. It appears as a whole or not at all.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn keep(&self, subject: &str, seed: u32, shot: &Shot) -> Result<(), String> {
+        let path = self.path(subject, &format!("{} {seed}", shot.spp));
+        write_exr(&path.with_extension("exr"), &shot.image)?;
+        write_json(&path.with_extension("json"), &json!({ "spp": shot.spp, "seed": seed, "seconds": shot.seconds }))
+    }
+
+    /// What is planned for a subject, if it is known: a list of numbers of samples per pixel.
+    pub fn load_plan(&self, subject: &str, budgets: &str) -> Option<Vec<u32>> {
+        let path = self.path(subject, budgets).with_extension("plan.json");
+        serde_json::from_slice(&std::fs::read(path).ok()?).ok()
+    }
+
+    /// Keeps a plan.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn keep_plan(&self, subject: &str, budgets: &str, plan: &[u32]) -> Result<(), String> {
+        write_json(&self.path(subject, budgets).with_extension("plan.json"), &json!(plan))
+    }
+
+    fn path(&self, subject: &str, what: &str) -> PathBuf {
+        let key = format!("{subject} {what} {} {}", rayon::current_num_threads(), super::machine());
+        self.0.join(&digest(key.as_bytes())[..32])
+    }
+}
+
+/// Writes a picture, as a whole or not at all.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn write_exr(path: &Path, image: &Image) -> Result<(), String> {
+    let part = path.with_extension("part.exr");
+    exr::write(&part, image, &exr::ExrOptions::default()).map_err(|e| format!("{}: {e}", part.display()))?;
+    std::fs::rename(&part, path).map_err(|e| format!("{}: {e}", path.display()))
+}
+
+/// Writes a document, as a whole or not at all.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn write_json(path: &Path, value: &Value) -> Result<(), String> {
+    let part = path.with_extension("part");
+    std::fs::write(&part, format!("{value:#}\n")).map_err(|e| format!("{}: {e}", part.display()))?;
+    std::fs::rename(&part, path).map_err(|e| format!("{}: {e}", path.display()))
+}
