@@ -1,8 +1,10 @@
 //! The same bits for any number of threads, in every run, and for a run that stops early.
 
-use lucerna::core::render::{Budget, Control, Progress, RenderContext, Report};
+use lucerna::core::render::{Budget, Control, PassEnd, Progress, RenderContext, Report};
 use lucerna::core::scene::xml::{LoadOptions, load_str};
 use lucerna::core::scene::{Scene, instantiate, resolve, upgrade};
+use std::ops::ControlFlow;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The built-in scene with another filter and sampler, 40 pixels wide: three tiles a side, the last one cut.
@@ -120,5 +122,24 @@ fn no_time_still_gives_every_pixel_a_sample() {
         let (report, bits) = render(&scene, 2, Budget::Seconds(0.0), &control);
         assert_eq!(report.spp, 1, "{name}");
         assert!(samples(&scene, 1, 1) == bits, "{name}");
+    }
+}
+
+#[test]
+fn what_looks_at_passes_can_end_the_run_there() {
+    for (name, scene) in scenes() {
+        let seen = Mutex::new(Vec::new());
+        let look = |pass: PassEnd<'_>| {
+            std::thread::sleep(std::time::Duration::from_millis(20));
+            seen.lock().unwrap().push((pass.spp, pass.seconds));
+            if pass.spp < 5 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        };
+        let control = Control::new().with_pass_end(&look);
+        let began = std::time::Instant::now();
+        let (report, bits) = render(&scene, 2, Budget::Samples(64), &control);
+        assert!(report.seconds + 0.1 <= began.elapsed().as_secs_f64() + 1e-3, "{name}: looking counted as rendering");
+        assert!(report.stopped && report.spp == 5, "{name}: {} spp", report.spp);
+        assert!(seen.lock().unwrap().iter().map(|(spp, _)| *spp).eq(1..=5), "{name}");
+        assert!(samples(&scene, 1, 5) == bits, "{name}");
     }
 }

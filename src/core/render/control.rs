@@ -1,7 +1,10 @@
 //! How long to render, and how to be told and stopped meanwhile.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use super::FilmStore;
+use crate::interfaces::FilmSettings;
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
 
 /// How long to render.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,17 +44,43 @@ pub struct Progress {
     pub spp: u32,
 }
 
+/// What is there when a pass is complete.
+#[derive(Clone, Copy)]
+pub struct PassEnd<'r> {
+    /// Samples per pixel so far.
+    pub spp: u32,
+    /// Seconds of rendering so far; time spent in the function this is given to does not count.
+    pub seconds: f64,
+    /// Size, window and filter, to develop the picture with.
+    pub film: &'r FilmSettings,
+    /// The sums so far.
+    pub store: &'r FilmStore,
+}
+
+/// Looks at the picture between passes, and may end the run.
+pub type OnPass<'a> = &'a (dyn Fn(PassEnd<'_>) -> ControlFlow<()> + Sync);
+
 /// Stop button, deadline and progress of a run.
 pub struct Control<'a> {
     stop: AtomicBool,
     started: Instant,
-    deadline: Option<Instant>,
+    /// Nanoseconds that were not spent on rendering.
+    aside: AtomicU64,
+    limit: Option<Duration>,
     on_progress: Option<&'a (dyn Fn(Progress) + Sync)>,
+    on_pass: Option<OnPass<'a>>,
 }
 
 impl Default for Control<'_> {
     fn default() -> Self {
-        Control { stop: AtomicBool::new(false), started: Instant::now(), deadline: None, on_progress: None }
+        Control {
+            stop: AtomicBool::new(false),
+            started: Instant::now(),
+            aside: AtomicU64::new(0),
+            limit: None,
+            on_progress: None,
+            on_pass: None,
+        }
     }
 }
 
@@ -64,13 +93,19 @@ impl<'a> Control<'a> {
     /// Stops by itself after so many seconds.
     pub fn with_deadline(mut self, seconds: f64) -> Self {
         // More than a century is no deadline (and would overflow the clock).
-        self.deadline = (seconds < 3.2e9).then(|| self.started + std::time::Duration::from_secs_f64(seconds.max(0.0)));
+        self.limit = (seconds < 3.2e9).then(|| Duration::from_secs_f64(seconds.max(0.0)));
         self
     }
 
     /// Calls a function as work gets done, from any thread.
     pub fn with_progress(mut self, on_progress: &'a (dyn Fn(Progress) + Sync)) -> Self {
         self.on_progress = Some(on_progress);
+        self
+    }
+
+    /// Calls a function after each complete pass, between passes; the clock of the run stands still meanwhile.
+    pub fn with_pass_end(mut self, on_pass: OnPass<'a>) -> Self {
+        self.on_pass = Some(on_pass);
         self
     }
 
@@ -86,18 +121,31 @@ impl<'a> Control<'a> {
 
     /// Whether the run should end: it was stopped, or the deadline has passed.
     pub fn should_stop(&self) -> bool {
-        self.is_stopped() || self.deadline.is_some_and(|d| Instant::now() >= d)
+        self.is_stopped() || self.limit.is_some_and(|limit| self.rendering() >= limit)
     }
 
-    /// Seconds since the start.
+    /// Seconds of rendering since the start.
     pub fn seconds(&self) -> f64 {
-        self.started.elapsed().as_secs_f64()
+        self.rendering().as_secs_f64()
     }
 
     /// Part of the time until the deadline that has passed, if there is one.
     pub fn time_fraction(&self) -> Option<f64> {
-        let total = self.deadline?.duration_since(self.started).as_secs_f64();
+        let total = self.limit?.as_secs_f64();
         Some(if total > 0.0 { (self.seconds() / total).min(1.0) } else { 1.0 })
+    }
+
+    fn rendering(&self) -> Duration {
+        self.started.elapsed().saturating_sub(Duration::from_nanos(self.aside.load(Ordering::Relaxed)))
+    }
+
+    /// To be called between passes.
+    pub(crate) fn end_pass(&self, spp: u32, film: &FilmSettings, store: &FilmStore) -> ControlFlow<()> {
+        let Some(on_pass) = self.on_pass else { return ControlFlow::Continue(()) };
+        let (seconds, began) = (self.seconds(), Instant::now());
+        let flow = on_pass(PassEnd { spp, seconds, film, store });
+        self.aside.fetch_add(began.elapsed().as_nanos() as u64, Ordering::Relaxed);
+        flow
     }
 
     pub(crate) fn progress(&self, progress: Progress) {

@@ -12,7 +12,7 @@ mod tabulated_filter;
 mod tiles;
 
 pub use bad_samples::{BadSample, BadSamples};
-pub use control::{Budget, Control, Progress, Schedule};
+pub use control::{Budget, Control, OnPass, PassEnd, Progress, Schedule};
 pub use film_store::FilmStore;
 pub use reference_order::ReferenceOrder;
 pub use tiles::{render_estimator, replay};

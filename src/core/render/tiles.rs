@@ -109,6 +109,9 @@ impl Run<'_, '_> {
                 break;
             }
             report.spp = end;
+            if cx.control.end_pass(end, &cx.film, &store).is_break() {
+                break;
+            }
         }
         report.stopped = report.spp < asked && matches!(cx.budget, Budget::Samples(_));
         report.seconds = cx.control.seconds();
