@@ -98,6 +98,12 @@ impl Microfacets {
         Microfacets { shape, alpha_u: alpha_u.max(1e-4), alpha_v: alpha_v.max(1e-4), sample_visible }
     }
 
+    /// Which distribution.
+    #[inline]
+    pub fn shape(&self) -> Shape {
+        self.shape
+    }
+
     /// Whether only visible normals are sampled.
     #[inline]
     pub fn samples_visible(&self) -> bool {
@@ -221,8 +227,8 @@ fn azimuth(v: Vec3) -> (f32, f32) {
     ((v.y * inv).clamp(-1.0, 1.0), (v.x * inv).clamp(-1.0, 1.0))
 }
 
-/// A visible slope of the Beckmann distribution of roughness 1. The cumulative distribution is inverted by three
-/// Newton steps in the domain of erf, which keeps the map from `u` continuous.
+/// A visible slope of the Beckmann distribution of roughness 1. The cumulative distribution is inverted by at most three
+/// Newton steps in the domain of erf, which keeps the map from `u` continuous; after a small one, the next is nothing.
 fn beckmann_slope(cos_theta_i: f32, u: Vec2) -> Vec2 {
     let tan = safe_sqrt(1.0 - cos_theta_i * cos_theta_i) / cos_theta_i;
     let cot = 1.0 / tan;
@@ -234,7 +240,11 @@ fn beckmann_slope(cos_theta_i: f32, u: Vec2) -> Vec2 {
     for _ in 0..3 {
         let slope = erfinv(x);
         let value = 1.0 + x + FRAC_1_SQRT_PI * tan * (-slope * slope).exp() - target;
-        x -= value / (1.0 - slope * tan);
+        let step = value / (1.0 - slope * tan);
+        x -= step;
+        if step.abs() < 1e-4 {
+            break;
+        }
     }
     Vec2::new(erfinv(x), erfinv(2.0 * u.y - 1.0))
 }

@@ -108,16 +108,22 @@ impl Quadrature {
         Quadrature((0..n).map(node).collect())
     }
 
-    /// Mean of `f` over the facets visible from `wi`.
+    /// Mean over the facets visible from `wi`, in the plane y = 0, of an `f` that is the same for both of two facets
+    /// which mirror each other there.
     fn mean_over_facets(&self, facets: &Microfacets, wi: Vec3, f: impl Fn(Vec3, Vec3) -> f32) -> f32 {
+        // One of both numbers chooses between mirrored facets, x < 1/2 or not: half of its nodes will do.
+        let half = &self.0[..self.0.len() / 2];
         let mut sum = 0.0;
-        for (y, wy) in &self.0 {
-            for (x, wx) in &self.0 {
-                let (m, _) = facets.sample(wi, Vec2::new(*x as f32, *y as f32));
-                sum += f64::from(f(wi, m)) * wx * wy;
+        for (x, wx) in half {
+            for (y, wy) in &self.0 {
+                let u = match facets.shape() {
+                    Shape::Beckmann => Vec2::new(*y as f32, *x as f32),
+                    Shape::Ggx => Vec2::new(*x as f32, *y as f32),
+                };
+                sum += f64::from(f(wi, facets.sample(wi, u).0)) * wx * wy;
             }
         }
-        sum as f32
+        2.0 * sum as f32
     }
 }
 

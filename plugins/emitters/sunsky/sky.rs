@@ -37,8 +37,8 @@ impl Sky {
     /// Radiance from a unit direction above the horizon.
     pub fn radiance(&self, d: Vec3) -> Rgb {
         // From the chord: the arc cosine of a dot product knows nothing of angles near the sun.
-        let gamma = 2.0 * (0.5 * (d - self.sun).length()).min(1.0).asin();
-        let cos_gamma = gamma.cos();
+        let chord2 = (d - self.sun).length_squared().min(4.0);
+        let (gamma, cos_gamma) = (2.0 * (0.5 * chord2.sqrt()).asin(), 1.0 - 0.5 * chord2);
         let (horizon, zenith) = (1.0 / (d.z + 0.01), safe_sqrt(d.z));
         let [r, g, b] = std::array::from_fn(|channel| {
             let [a, b, c, d, e, f, g, i, h] = self.shape[channel];
