@@ -2,7 +2,6 @@
 
 use super::object::{BuiltSensor, BuiltShape};
 use crate::accel::{Accel, BuildOptions, Geometry, Hit, NO_INSTANCE, NO_TRIANGLE, Ray};
-use crate::color::Rgb;
 use crate::interfaces::{Bsdf, Emitter, EmitterFlags, Integrator, LightPoint, LightSample, SurfaceHit};
 use crate::math::{ONE_MINUS_EPSILON, Transform, Vec2, Vec3};
 use crate::sampling::Discrete;
@@ -343,12 +342,6 @@ impl Scene {
     #[inline]
     pub fn visible(&self, hit: &SurfaceHit, light: &LightSample) -> bool {
         !self.occluded(&shadow_ray(hit, light))
-    }
-
-    /// Radiance from where a ray goes that hits nothing.
-    #[inline]
-    pub fn background(&self, d: Vec3) -> Rgb {
-        self.environment.map_or(Rgb::BLACK, |id| self.emitter(id).background(d))
     }
 }
 
