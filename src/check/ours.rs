@@ -87,7 +87,10 @@ impl Ours {
 
     fn resized(mut self, registry: &Registry, size: [u32; 2], options: &Options) -> Result<Self, Refusal> {
         self.description.resize_films(size, "--size");
-        Self::build(registry, &self.path, self.description, self.files, options)
+        let resized = Self::build(registry, &self.path, self.description, self.files, options)?;
+        resized.seconds.set(self.seconds.get());
+        resized.bad.set(self.bad.get());
+        Ok(resized)
     }
 
     /// Width and height of the picture.
