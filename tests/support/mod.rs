@@ -2,6 +2,7 @@
 #![allow(dead_code)] // Each test binary uses its part.
 
 pub mod damage;
+pub mod program;
 
 use lucerna::check::stored::{self, Entry};
 use lucerna::core::image::Image;
