@@ -141,6 +141,8 @@ def main():
     parser.add_argument("--threads", type=int, default=1, help="threads that build and trace; 0: all")
     tables.add_arguments(parser)
     arguments = parser.parse_args()
+    if not arguments.triangles and not arguments.scenes:
+        parser.error("nothing to time: give --triangles a number, or scenes")
     arguments.threads = arguments.threads or os.cpu_count()
     tables.check_arguments(arguments)
 
@@ -162,16 +164,10 @@ def main():
             rows += summarise(label, reports)
             wrong += disagreements(label, reports)
             versions = [reports[name][0]["tracer"] for name in (LUCERNA, EMBREE)]
-    text = markdown(rows, versions, arguments)
-    print(text, end="")
-    if arguments.markdown:
-        arguments.markdown.write_text(text)
-    if arguments.csv:
-        tables.write_csv(arguments.csv, rows)
-    if arguments.plot:
-        groups = {f"to {other}": [(f"{row['input']}, {row['what']}", *(row[f"{kind}ratio to {other}"] for kind in ("", "least ", "largest ")))
-                                  for row in rows] for other in (EMBREE, ROBUST)}
-        tables.plot_ratios(arguments.plot, f"Single rays, {' and '.join(versions)}, {arguments.threads} thread(s)", groups)
+    groups = {f"to {other}": [(f"{row['input']}, {row['what']}", *(row[f"{kind}ratio to {other}"] for kind in ("", "least ", "largest ")))
+                              for row in rows] for other in (EMBREE, ROBUST)}
+    title = f"Single rays, {' and '.join(versions)}, {arguments.threads} thread(s)"
+    tables.report(arguments, markdown(rows, versions, arguments), rows, title, groups)
     for line in wrong:
         print(f"not the same: {line}", file=sys.stderr)
     return 1 if wrong else 0

@@ -232,19 +232,13 @@ def main():
     table = []
     for scene in arguments.scenes:
         table += summarise(scene, measure(scene.resolve(), arguments, python))
-    text = markdown(table, arguments)
-    print(text, end="")
-    if arguments.markdown:
-        arguments.markdown.write_text(text)
-    if arguments.csv:
-        tables.write_csv(arguments.csv, table)
-    if arguments.plot:
-        groups = {}
-        for line in table:
-            if line["ratio"]:
-                row = (f"{line['scene']}, {line['kind']}", line["ratio"], line["ratio_min"], line["ratio_max"])
-                groups.setdefault(f"to {line['renderer']}", []).append(row)
-        tables.plot_ratios(arguments.plot, f"Whole renders, {arguments.spp} samples per pixel", groups)
+    groups = {}
+    for line in table:
+        if line["ratio"]:
+            row = (f"{line['scene']}, {line['kind']}", line["ratio"], line["ratio_min"], line["ratio_max"])
+            groups.setdefault(f"to {line['renderer']}", []).append(row)
+    title = f"Whole renders, {arguments.spp} samples per pixel"
+    tables.report(arguments, markdown(table, arguments), table, title, groups)
 
 
 if __name__ == "__main__":

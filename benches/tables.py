@@ -22,6 +22,17 @@ def check_arguments(arguments):
             sys.exit(NEEDED)
 
 
+def report(arguments, text, rows, title, groups):
+    """Prints the table `text`, and writes what the options ask for: it, the `rows` as CSV, and a picture of `groups`."""
+    print(text, end="")
+    if arguments.markdown:
+        arguments.markdown.write_text(text)
+    if arguments.csv:
+        write_csv(arguments.csv, rows)
+    if arguments.plot:
+        plot_ratios(arguments.plot, title, groups)
+
+
 def write_csv(path, rows):
     """Dictionaries with the same keys."""
     with path.open("w", newline="") as file:

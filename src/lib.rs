@@ -14,6 +14,7 @@
 pub mod check;
 mod cli;
 pub mod compare;
+mod pictures;
 mod short_form;
 
 pub use lucerna_core as core;

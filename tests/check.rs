@@ -1,30 +1,18 @@
 //! `lucerna check` as a user meets it: verdicts, exit codes, what it writes and keeps. None of these tests needs the
 //! reference: where it has to be asked, a small program stands in for Python.
 
+mod support;
+
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use support::program::{Run, folder_of, text};
 
 const SCENE: &str = "scenes/tests/emitters/point.xml";
 
-struct Run {
-    code: i32,
-    stdout: String,
-    stderr: String,
-}
-
 /// Runs the program; `python` is what it takes for the reference's interpreter.
 fn check(python: &Path, arguments: &[&str]) -> Run {
-    let output = Command::new(env!("CARGO_BIN_EXE_lucerna"))
-        .arg("check")
-        .args(arguments)
-        .env("LUCERNA_REFERENCE_PYTHON", python)
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
-        .stdin(Stdio::null())
-        .output()
-        .expect("the program starts");
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("messages are UTF-8");
-    Run { code: output.status.code().expect("no signal"), stdout: text(output.stdout), stderr: text(output.stderr) }
+    let arguments = [&["check"], arguments].concat();
+    Run::of(&arguments, |command| _ = command.env("LUCERNA_REFERENCE_PYTHON", python))
 }
 
 fn nobody() -> &'static Path {
@@ -33,14 +21,10 @@ fn nobody() -> &'static Path {
 
 /// An empty folder for one test.
 fn temporary(test: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("check").join(test);
+    let folder = folder_of("check", test);
     let _ = std::fs::remove_dir_all(&folder);
     std::fs::create_dir_all(&folder).expect("a folder for temporary files");
     folder
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().expect("temporary names are UTF-8")
 }
 
 /// A copy of a repository with one scene and its references; `change` rewrites the manifest's entry.

@@ -1,31 +1,19 @@
 //! The program as a user meets it: options, files it writes, messages and exit codes.
 
+mod support;
+
 use lucerna::core::image::exr::Attribute;
 use lucerna::core::image::{self, Image, ReadLimits, exr};
 use lucerna::core::scene::xml::{LoadOptions, load, load_upgraded};
 use lucerna::core::scene::{Description, NodeId, Value};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use support::program::{Run, folder_of, text};
 
 /// Edge of the pictures rendered here.
 const RES: u32 = 16;
 
-/// How a run of the program ended.
-struct Run {
-    code: i32,
-    stdout: String,
-    stderr: String,
-}
-
 fn lucerna(arguments: &[&str]) -> Run {
-    let output = Command::new(env!("CARGO_BIN_EXE_lucerna"))
-        .args(arguments)
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
-        .stdin(Stdio::null())
-        .output()
-        .expect("the program starts");
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("messages are UTF-8");
-    Run { code: output.status.code().expect("no signal"), stdout: text(output.stdout), stderr: text(output.stderr) }
+    Run::of(arguments, |_| ())
 }
 
 /// A run that must succeed.
@@ -37,15 +25,11 @@ fn done(arguments: &[&str]) -> Run {
 
 /// A place for a file of one test.
 fn temporary(test: &str, name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cli").join(test);
+    let folder = folder_of("cli", test);
     std::fs::create_dir_all(&folder).expect("a folder for temporary files");
     let file = folder.join(name);
     let _ = std::fs::remove_file(&file);
     file
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().expect("temporary names are UTF-8")
 }
 
 /// Renders the built-in scene at a tiny size and reads what was written.

@@ -51,11 +51,12 @@ pub fn of_scene(scene: &Scene) -> (Mesh, usize) {
     for built in scene.shapes() {
         match (built.shape.geometry(), built.shape.instance()) {
             (Geometry::Mesh { positions, triangles }, _) => mesh.add(positions.iter().copied(), triangles),
-            (_, Some((group, matrix))) => {
-                for member in group.shapes() {
+            (_, Some(instance)) => {
+                let to_world = instance.to_world();
+                for member in instance.group().shapes() {
                     match member.shape.geometry() {
                         Geometry::Mesh { positions, triangles } => {
-                            mesh.add(positions.iter().map(|p| matrix.transform_point3(*p)), triangles);
+                            mesh.add(positions.iter().map(|p| to_world.point(*p)), triangles);
                         }
                         Geometry::Analytic(_) => others += 1,
                     }

@@ -1,7 +1,7 @@
 //! Scenes and single objects from XML.
 
-use lucerna::core::scene::{Description, NodeId, Object, Scene, SceneErrors, Value};
-use lucerna::core::scene::{build_one, instantiate, resolve, upgrade, xml};
+use lucerna::core::scene::{NodeId, Object, Scene, SceneErrors, Value};
+use lucerna::core::scene::{build_one, instantiate, xml};
 use std::path::Path;
 
 /// A scene file, ready to render.
@@ -13,7 +13,7 @@ pub fn scene(path: &Path) -> Result<Scene, SceneErrors> {
 /// A scene from text.
 pub fn scene_of(text: &str) -> Scene {
     let options = xml::LoadOptions::default();
-    let built = xml::load_str(text, "bench", &options).and_then(prepared);
+    let built = xml::load_str(text, "bench", &options).and_then(xml::upgraded);
     built.and_then(|d| instantiate(&lucerna::builtin(), d, false)).unwrap_or_else(|e| panic!("{text}: {e}")).scene
 }
 
@@ -21,7 +21,7 @@ pub fn scene_of(text: &str) -> Scene {
 pub fn build(text: &str) -> Object {
     let scene = format!("<scene version='3.9.1'>{text}</scene>");
     let build = || {
-        let mut description = prepared(xml::load_str(&scene, "bench", &xml::LoadOptions::default())?)?;
+        let mut description = xml::upgraded(xml::load_str(&scene, "bench", &xml::LoadOptions::default())?)?;
         let mut objects = description.node(description.root).parameters.iter().filter_map(|p| match p.value {
             Value::Object(id) => Some(id),
             _ => None,
@@ -30,10 +30,4 @@ pub fn build(text: &str) -> Object {
         build_one(&lucerna::builtin(), &description)
     };
     build().unwrap_or_else(|e| panic!("{text}: {e}"))
-}
-
-fn prepared(mut description: Description) -> Result<Description, SceneErrors> {
-    resolve::resolve(&mut description)?;
-    upgrade::upgrade(&mut description);
-    Ok(description)
 }

@@ -133,9 +133,17 @@ pub fn weighted_emission(
     }
 }
 
-/// The first hit that gives off no light, written in place: what the camera sees where lights are hidden. Whether there
-/// is any.
-pub fn find_surface_without_light(scene: &Scene, ray: &Ray, hit: &mut SurfaceHit, rays: &mut u32) -> bool {
+/// The first hit, or where lights are `hidden` the first that gives off none, written in place. Whether there is any.
+#[inline]
+pub fn find_surface(scene: &Scene, ray: &Ray, hidden: bool, hit: &mut SurfaceHit, rays: &mut u32) -> bool {
+    if hidden {
+        return find_surface_without_light(scene, ray, hit, rays);
+    }
+    *rays += 1;
+    scene.find_surface(ray, hit)
+}
+
+fn find_surface_without_light(scene: &Scene, ray: &Ray, hit: &mut SurfaceHit, rays: &mut u32) -> bool {
     let mut ray = *ray;
     loop {
         *rays += 1;

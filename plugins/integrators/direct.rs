@@ -18,7 +18,7 @@
 //! ```
 
 use super::common::{
-    COMMON, HIDE, emission, find_surface_without_light, forward_integrator, mis_weight, pair_before_single, timeout,
+    COMMON, HIDE, emission, find_surface, forward_integrator, mis_weight, pair_before_single, timeout,
 };
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{
@@ -81,12 +81,7 @@ impl RadianceEstimator for Direct {
         let ray = &camera.ray;
         let mut found = Radiance::default();
         let mut hit = SurfaceHit::default();
-        let met = if self.hide_emitters {
-            find_surface_without_light(scene, ray, &mut hit, &mut found.rays)
-        } else {
-            found.rays += 1;
-            scene.find_surface(ray, &mut hit)
-        };
+        let met = find_surface(scene, ray, self.hide_emitters, &mut hit, &mut found.rays);
         if !self.hide_emitters
             && let Some((_, radiance)) = emission(scene, ray, met.then_some(&hit))
         {

@@ -18,7 +18,7 @@
 //! ```
 
 use super::common::{
-    COMMON, PATH, PathLimits, Scattered, find_surface_without_light, forward_integrator, mis_weight, survival, timeout,
+    COMMON, PATH, PathLimits, Scattered, find_surface, forward_integrator, mis_weight, survival, timeout,
     weighted_emission,
 };
 use lucerna_core::color::Rgb;
@@ -74,12 +74,7 @@ impl RadianceEstimator for Path {
         let mut hit = SurfaceHit::default();
         loop {
             let hidden = hide_emitters && depth == 0;
-            let met = if hidden {
-                find_surface_without_light(scene, &ray, &mut hit, &mut found.rays)
-            } else {
-                found.rays += 1;
-                scene.find_surface(&ray, &mut hit)
-            };
+            let met = find_surface(scene, &ray, hidden, &mut hit, &mut found.rays);
             if !hidden {
                 found.rgb += throughput * weighted_emission(scene, &ray, met.then_some(&hit), last, mis_weight);
             }

@@ -18,7 +18,7 @@
 //! ```
 
 use super::common::{
-    COMMON, PATH, PathLimits, Scattered, balance_weight, find_surface_without_light, forward_integrator, mis_weight,
+    COMMON, PATH, PathLimits, Scattered, balance_weight, find_surface, forward_integrator, mis_weight,
     pair_before_single, survival, timeout, weighted_emission,
 };
 use lucerna_core::accel::Ray;
@@ -119,12 +119,7 @@ impl RadianceEstimator for VolPath {
                 throughput *= 1.0 / q;
             }
             let hidden = hide_emitters && depth == 0;
-            let met = if hidden {
-                find_surface_without_light(scene, &ray, &mut hit, &mut found.rays)
-            } else {
-                found.rays += 1;
-                scene.find_surface(&ray, &mut hit)
-            };
+            let met = find_surface(scene, &ray, hidden, &mut hit, &mut found.rays);
             if !hidden {
                 found.rgb += throughput
                     * weighted_emission(scene, &ray, met.then_some(&hit), last, |a, b| self.variant.weight(a, b));

@@ -1,6 +1,7 @@
 //! References that were rendered before: one folder each, named after the hash of all they depend on.
 
 use super::reference::{Reference, Source};
+use crate::pictures::{write_exr, write_json};
 use lucerna_core::image::{Image, ReadLimits, exr};
 use lucerna_core::stats::Measured;
 use serde_json::{Value, json};
@@ -83,13 +84,10 @@ pub fn store(folder: &Path, key: &str, reference: &Reference) -> Result<(), Stri
         "channels": measured.channels,
         "notes": reference.notes,
     });
-    let write = |name: &str, image: &Image| {
-        exr::write(&part.join(name), image, &exr::ExrOptions::default()).map_err(|e| e.to_string())
-    };
-    let written = write(MEAN, &measured.picture(&measured.mean))
-        .and_then(|()| write(VARIANCE, &measured.picture(&measured.variance)))
-        .and_then(|()| write(TILES, &tiles))
-        .and_then(|()| std::fs::write(part.join(ABOUT), format!("{about:#}\n")).map_err(text));
+    let written = write_exr(&part.join(MEAN), &measured.picture(&measured.mean))
+        .and_then(|()| write_exr(&part.join(VARIANCE), &measured.picture(&measured.variance)))
+        .and_then(|()| write_exr(&part.join(TILES), &tiles))
+        .and_then(|()| write_json(&part.join(ABOUT), &about));
     let done = written.and_then(|()| {
         let whole = folder.join(key);
         // What is there was damaged, or another run was faster; either may go.

@@ -2,9 +2,9 @@
 
 use super::Findings;
 use lucerna_core::image::{Image, exr, png, srgb_to_linear};
+use lucerna_core::stats::TILE;
 use lucerna_core::stats::agreement::{relative_difference, scale};
 use lucerna_core::stats::images::Scale;
-use lucerna_core::stats::{Measured, TILE};
 use std::path::Path;
 
 /// |t| at which the colours of a map end.
@@ -46,11 +46,10 @@ impl Map {
 /// # Errors
 /// If a picture cannot be encoded.
 pub fn maps(findings: &Findings) -> Result<Vec<Map>, String> {
-    let (ours, theirs) = (&findings.ours, &findings.theirs);
-    let (image, reference) = (ours.picture(&ours.mean), theirs.picture(&theirs.mean));
-    let exposure = exposure(&reference);
+    let (image, reference) = (&findings.ours, &findings.theirs);
+    let exposure = exposure(reference);
     let brightness = if exposure == 1.0 { String::new() } else { format!(", brightness × {exposure:.3}") };
-    let mean = scale(&reference);
+    let mean = scale(reference);
     let values = image.data.iter().zip(&reference.data);
     let relative = values.map(|(a, b)| relative_difference(*a, *b, 100.0 * mean).copysign(a - b));
     let difference = Image { data: relative.collect(), ..image.clone() };
@@ -59,8 +58,8 @@ pub fn maps(findings: &Findings) -> Result<Vec<Map>, String> {
     let caption =
         format!("Difference: red where Lucerna is brighter, blue where it is darker; full colour at {percent:.1} %");
     let mut maps = vec![
-        Map::new("image", format!("Lucerna{brightness}"), image.clone(), &exposed(&image, exposure))?,
-        Map::new("reference", format!("Reference{brightness}"), reference.clone(), &exposed(&reference, exposure))?,
+        Map::new("image", format!("Lucerna{brightness}"), image.clone(), &exposed(image, exposure))?,
+        Map::new("reference", format!("Reference{brightness}"), reference.clone(), &exposed(reference, exposure))?,
         Map::new("difference", caption, difference.clone(), &diverging(&difference, most))?,
     ];
     if let Some(comparison) = &findings.comparison {
@@ -68,7 +67,7 @@ pub fn maps(findings: &Findings) -> Result<Vec<Map>, String> {
         let pixels = Image { data: t(Scale::Pixel), ..image.clone() };
         let caption = format!("Pixels, in standard errors of the difference; full colour at {MOST_SIGMA} σ");
         maps.push(Map::new("z-map", caption, pixels.clone(), &diverging(&pixels, MOST_SIGMA))?);
-        let tiles = enlarged(ours, &t(Scale::Tile));
+        let tiles = enlarged(image, &t(Scale::Tile));
         let caption = format!("Means of 8 × 8 pixels, in standard errors; full colour at {MOST_SIGMA} σ");
         maps.push(Map::new("tiles", caption, tiles.clone(), &diverging(&tiles, MOST_SIGMA))?);
     }
@@ -76,13 +75,13 @@ pub fn maps(findings: &Findings) -> Result<Vec<Map>, String> {
 }
 
 /// Values of tiles, one for each pixel.
-fn enlarged(measured: &Measured, tiles: &[f32]) -> Image {
-    let ([width, height], channels) = (measured.size, measured.channels.len());
+fn enlarged(image: &Image, tiles: &[f32]) -> Image {
+    let (width, height, channels) = (image.width, image.height, image.channels.len());
     let columns = width.div_ceil(TILE);
     let tile = |x: u32, y: u32| (y / TILE * columns + x / TILE) as usize * channels;
     let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
     let data = pixels.flat_map(|(x, y)| &tiles[tile(x, y)..tile(x, y) + channels]).copied().collect();
-    Image { width, height, channels: measured.channels.clone(), data }
+    Image { width, height, channels: image.channels.clone(), data }
 }
 
 /// The channels that are shown: colour, else the first three times.

@@ -128,12 +128,12 @@ impl Refusal {
     }
 }
 
-/// What was measured of a scene.
+/// What was found in a scene.
 pub struct Findings {
-    /// Our picture.
-    pub ours: Measured,
+    /// Our picture, the channels that are compared.
+    pub ours: Image,
     /// The reference's.
-    pub theirs: Measured,
+    pub theirs: Image,
     /// Statistical comparison.
     pub comparison: Option<Comparison>,
     /// Comparison sample for sample.
@@ -154,7 +154,7 @@ pub struct Outcome {
     pub spp: [u32; 2],
     /// Seconds of rendering, ours and the reference's (0 where it was stored).
     pub seconds: [f64; 2],
-    /// What was measured.
+    /// What was found.
     pub findings: Option<Findings>,
 }
 
@@ -255,8 +255,8 @@ fn check_statistically(
         spp: [ours.total_spp(), reference.spp * reference.measured.passes],
         seconds: [ours.seconds(), reference.seconds],
         findings: Some(Findings {
-            ours: own,
-            theirs: reference.measured,
+            ours: own.picture(&own.mean),
+            theirs: reference.measured.picture(&reference.measured.mean),
             comparison: Some(comparison),
             agreement: None,
         }),
@@ -265,38 +265,34 @@ fn check_statistically(
 
 /// Sample for sample, against stored images of `scalar_rgb` or one rendered now.
 fn check_exact(registry: &Registry, path: &std::path::Path, options: &Options) -> Result<Outcome, Refusal> {
-    let ours = Ours::load(registry, path, options)?;
+    let mut ours = Ours::load(registry, path, options)?;
     let entries = if options.fresh { Vec::new() } else { stored::find_exact(path, &ours, options)? };
-    let mut shots: Vec<(Image, u32, u32, Option<[u32; 2]>)> = Vec::new();
+    let mut shots: Vec<(Image, u32, u32, [u32; 2])> = Vec::new();
     let (mut description, mut seconds) = (String::new(), [0.0; 2]);
     for entry in &entries {
         description = format!("{} stored images of scalar_rgb", entries.len());
-        shots.push((entry.load_exact()?, entry.seed, entry.spp, Some(entry.size)));
+        shots.push((entry.load_exact()?, entry.seed, entry.spp, entry.size));
     }
     if shots.is_empty() {
         let spp = options.spp.unwrap_or(4);
         let (image, took) = reference::exact(&ours, options, spp)?;
         description = format!("scalar_rgb, {spp} spp, seed {}", options.seed);
         seconds[1] = took;
-        shots.push((image, options.seed, spp, None));
+        shots.push((image, options.seed, spp, ours.size()));
     }
     let mut worst: Option<(Agreement, Findings)> = None;
     let mut spp = 0;
     for (theirs, seed, shot_spp, size) in shots {
-        let mut ours = match size {
-            Some(size) => Ours::load(registry, path, options)?.at_size(registry, size, options)?,
-            None => Ours::load(registry, path, options)?,
-        };
+        ours = ours.at_size(registry, size, options)?;
         ours.use_reference_offsets();
         let image = ours.render_exact(shot_spp, seed)?;
-        seconds[0] += ours.seconds();
+        seconds[0] = ours.seconds();
         spp = spp.max(shot_spp);
         let channels = compared(&theirs.channels);
         let found = agreement(&image, &theirs, &channels, TOLERANCE).map_err(Refusal::Failed)?;
         if worst.as_ref().is_none_or(|(known, _)| found.share < known.share) {
-            let measured = |image: &Image| Measured::of(&[image.clone(), image.clone()], &channels);
-            let (ours, theirs) = (measured(&image), measured(&theirs));
-            let (ours, theirs) = (ours.map_err(Refusal::Failed)?, theirs.map_err(Refusal::Failed)?);
+            let picked = |image: &Image| image.pick(&channels).map_err(Refusal::Failed);
+            let (ours, theirs) = (picked(&image)?, picked(&theirs)?);
             worst = Some((found, Findings { ours, theirs, comparison: None, agreement: Some(found) }));
         }
     }

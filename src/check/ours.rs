@@ -2,9 +2,10 @@
 
 use super::reference::Reference;
 use super::{Options, PASSES, Refusal, TARGET, compared};
+use crate::pictures::{NOT_BUILT, Source, one_line, read, render};
 use lucerna_core::image::Image;
-use lucerna_core::render::{Budget, Control, RenderContext};
-use lucerna_core::scene::{Description, ObjectKind, Registry, Scene, SceneErrors, instantiate, resolve, upgrade, xml};
+use lucerna_core::render::RenderContext;
+use lucerna_core::scene::{Description, ObjectKind, Registry, Scene, SceneErrors, instantiate};
 use lucerna_core::stats::Measured;
 use lucerna_core::stats::images::variance_ratio;
 use std::cell::Cell;
@@ -39,11 +40,7 @@ pub struct Ours {
 impl Ours {
     /// Reads a scene, at the size that was asked for.
     pub fn load(registry: &Registry, path: &Path, options: &Options) -> Result<Self, Refusal> {
-        let errors = |errors: SceneErrors| refusal(&errors);
-        let mut description = xml::load(path, &options.reading).map_err(errors)?;
-        let files = description.files();
-        resolve::resolve(&mut description).map_err(errors)?;
-        upgrade::upgrade(&mut description);
+        let Source { description, files } = read(path, &options.reading).map_err(|e| refusal(&e))?;
         let sensors = || description.nodes.iter().filter(|node| node.kind == ObjectKind::Sensor);
         if sensors().next().is_none() {
             return Err(Refusal::NotForUs("the scene has no sensor".to_owned()));
@@ -90,7 +87,10 @@ impl Ours {
 
     fn resized(mut self, registry: &Registry, size: [u32; 2], options: &Options) -> Result<Self, Refusal> {
         self.description.resize_films(size, "--size");
-        Self::build(registry, &self.path, self.description, self.files, options)
+        let resized = Self::build(registry, &self.path, self.description, self.files, options)?;
+        resized.seconds.set(self.seconds.get());
+        resized.bad.set(self.bad.get());
+        Ok(resized)
     }
 
     /// Width and height of the picture.
@@ -128,18 +128,11 @@ impl Ours {
     }
 
     fn render(&self, spp: u32, seed: u32, change: impl FnOnce(&mut RenderContext<'_>)) -> Result<Image, Refusal> {
-        let control = Control::new();
-        let camera = &self.scene.sensors()[0];
-        let integrator = self.scene.integrator().ok_or_else(|| Refusal::failed("the scene has no integrator"))?;
-        let budget = Budget::Samples(camera.sampler.round_spp(spp));
-        let mut cx = RenderContext::new(&self.scene, camera, budget, seed, &control, integrator.aov_names());
-        change(&mut cx);
-        let report = integrator.render(&mut cx).map_err(Refusal::failed)?;
-        self.seconds.set(self.seconds.get() + report.seconds);
-        self.bad.set(self.bad.get() + report.bad.count);
-        let (channels, data) = cx.store.develop(&cx.film);
-        let size = cx.store.size();
-        Ok(Image { width: size.x, height: size.y, channels, data })
+        let spp = self.scene.sensors()[0].sampler.round_spp(spp);
+        let rendered = render(&self.scene, spp, seed, change).map_err(Refusal::failed)?;
+        self.seconds.set(self.seconds.get() + rendered.seconds);
+        self.bad.set(self.bad.get() + rendered.bad);
+        Ok(rendered.image)
     }
 
     /// One render with the reference's random numbers in its order.
@@ -211,14 +204,8 @@ pub fn plan_spp(trial: &Measured, independent_pixels: bool) -> u32 {
 
 /// Errors of a scene as one line, and whether it is only that something is not built.
 fn refusal(errors: &SceneErrors) -> Refusal {
-    let not_built = |message: &str| message.contains("not built");
-    let first = errors.0.iter().find(|e| not_built(&e.message)).or(errors.0.first());
-    let text = first.map_or_else(|| "the scene cannot be read".to_owned(), ToString::to_string);
-    let text = text.strip_prefix("error: ").unwrap_or(&text).to_owned();
-    let more = errors.0.len().saturating_sub(1);
-    let text = if more > 0 { format!("{text} (and {more} more)") } else { text };
-    match !errors.0.is_empty() && errors.0.iter().any(|e| not_built(&e.message)) {
-        true => Refusal::NotForUs(text),
-        false => Refusal::Failed(text),
+    match errors.0.iter().any(|e| e.message.contains(NOT_BUILT)) {
+        true => Refusal::NotForUs(one_line(errors)),
+        false => Refusal::Failed(one_line(errors)),
     }
 }

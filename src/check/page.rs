@@ -3,6 +3,7 @@
 use super::maps::{Map, maps};
 use super::{Findings, Outcome, Verdict};
 use base64::Engine as _;
+use lucerna_core::image::Image;
 use lucerna_core::stats::TILE;
 use lucerna_core::stats::images::{Comparison, Scale};
 use std::fmt::Write as _;
@@ -72,7 +73,7 @@ fn section(outcome: &Outcome, findings: &Findings, maps: &[Map], folder: &Path) 
         outcome.verdict.text(),
         sentence(outcome, findings)
     );
-    let [width, height] = findings.theirs.size;
+    let Image { width, height, .. } = findings.theirs;
     let _ = writeln!(
         html,
         "<p class=\"small\">{width} × {height} pixels. Reference: {}, {} samples per pixel. Lucerna: {} samples per pixel. \
@@ -197,7 +198,7 @@ fn places_table(comparison: &Comparison) -> String {
 }
 
 fn figure(map: &Map, findings: &Findings, maps: &[Map]) -> String {
-    let [width, height] = findings.theirs.size;
+    let Image { width, height, .. } = findings.theirs;
     let factor = SHOWN_WIDTH.div_ceil(width).max(1);
     let data = |map: &Map| base64::engine::general_purpose::STANDARD.encode(&map.png);
     // Lucerna's picture turns into the reference's under the pointer.

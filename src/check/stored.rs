@@ -111,11 +111,15 @@ pub fn repository(path: &Path) -> Option<PathBuf> {
 /// The tables of a section of a repository's manifest: `image` or `exact`.
 ///
 /// # Errors
-/// If it cannot be read.
+/// If it cannot be read, or an entry lacks something.
 pub fn manifest(root: &Path, section: &str) -> Result<Vec<Entry>, String> {
     let table = read_toml(&root.join(MANIFEST))?;
     let entries = table.get(section).and_then(toml::Value::as_table);
-    Ok(entries.into_iter().flatten().filter_map(|(name, entry)| read_entry(root, name, entry.as_table()?)).collect())
+    let read = |(name, entry): (&String, &toml::Value)| {
+        let entry = entry.as_table().and_then(|entry| read_entry(root, name, entry));
+        entry.ok_or_else(|| format!("{}: the entry \"{name}\" is not complete", root.join(MANIFEST).display()))
+    };
+    entries.into_iter().flatten().map(read).collect()
 }
 
 fn read_entry(root: &Path, name: &str, entry: &toml::Table) -> Option<Entry> {

@@ -225,7 +225,7 @@ fn to_json(outcome: &Outcome) -> Value {
     value["reference"] = json!(outcome.reference);
     value["spp"] = json!({"ours": outcome.spp[0], "reference": outcome.spp[1]});
     value["seconds"] = json!({"ours": outcome.seconds[0], "reference": outcome.seconds[1]});
-    value["size"] = json!(findings.theirs.size);
+    value["size"] = json!([findings.theirs.width, findings.theirs.height]);
     if let Some(comparison) = &findings.comparison {
         let (mean, error) = comparison.mean_difference();
         value["mean_difference"] = json!({"relative": mean, "standard_error": error});

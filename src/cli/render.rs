@@ -5,7 +5,7 @@ use super::progress::Bar;
 use super::scene_args::{SceneArguments, default_output};
 use crate::short_form;
 use clap::Args;
-use lucerna_core::image::{self, Image, exr, png};
+use lucerna_core::image::{self, exr, png};
 use lucerna_core::interfaces::{ComponentFormat, FileFormat, Integrator};
 use lucerna_core::math::UVec2;
 use lucerna_core::render::{Budget, Control, FilmStore, RenderContext, Report, SampleOrder, replay};
@@ -299,9 +299,7 @@ fn write(
     report: &Report,
     output: &Path,
 ) -> Result<(), Failure> {
-    let (channels, data) = cx.store.develop(&cx.film);
-    let size = cx.store.size();
-    let picture = Image { width: size.x, height: size.y, channels, data };
+    let picture = cx.picture();
     let extension = output.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     let written = match extension.as_deref() {
         Some("exr") => exr::write(output, &picture, &exr_options(arguments, integrator, cx, report)),

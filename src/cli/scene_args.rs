@@ -2,8 +2,8 @@
 
 use super::{Failure, key_value};
 use clap::Args;
-use lucerna_core::scene::xml::{LoadOptions, load, load_str};
-use lucerna_core::scene::{Description, Instantiated, Registry, instantiate, resolve, upgrade};
+use lucerna_core::scene::xml::{LoadOptions, load, load_str, upgraded};
+use lucerna_core::scene::{Description, Instantiated, Registry, instantiate};
 use std::path::{Path, PathBuf};
 
 /// Which scene, and how to read it.
@@ -60,12 +60,10 @@ impl SceneArguments {
 
     /// Reads the scene and brings it into today's language; tells notes under `-v`.
     pub fn describe(&self) -> Result<Description, Failure> {
-        let mut description = match &self.scene {
+        let description = upgraded(match &self.scene {
             Some(path) => load(path, &self.reading.options())?,
             None => load_str(crate::DEFAULT_SCENE, "cornell-box.xml", &self.reading.options())?,
-        };
-        resolve::resolve(&mut description)?;
-        upgrade::upgrade(&mut description);
+        })?;
         if self.reading.verbose > 0 {
             for note in &description.notes {
                 eprintln!("note: {note}");

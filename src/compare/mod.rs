@@ -244,7 +244,7 @@ fn take_turns(
 ) -> Result<(), String> {
     for Contestant { method, state } in contestants {
         let Ok((subject, plan)) = &state else { continue };
-        let is_missing = |spp: &u32| store.load(&subject.key, *spp, seed).is_none();
+        let is_missing = |spp: &u32| !store.has(&subject.key, *spp, seed);
         let missing: Vec<u32> = plan.counts.iter().copied().filter(is_missing).collect();
         if missing.is_empty() {
             continue;

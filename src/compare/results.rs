@@ -55,10 +55,14 @@ impl Point {
 
     /// How much brighter than the reference the picture is as a whole, the reference's own noise included.
     pub fn mean_difference(&self, truth: &Truth) -> Interval {
-        let values = self.each(|e| e.mean_difference);
+        let value = self.mean(|e| e.mean_difference).value;
+        Interval::with_error(value, self.error_of_mean_difference(truth), self.errors.len() as f64 - 1.0)
+    }
+
+    /// Standard error of that; `None` of a single seed.
+    fn error_of_mean_difference(&self, truth: &Truth) -> Option<f64> {
         let of_truth = truth.noise.map_or(0.0, |[.., variance]| variance);
-        let error = standard_error(&values).map(|error| error.hypot(of_truth.sqrt()));
-        Interval::with_error(Interval::of_mean(&values).value, error, values.len() as f64 - 1.0)
+        standard_error(&self.each(|e| e.mean_difference)).map(|error| error.hypot(of_truth.sqrt()))
     }
 }
 
@@ -133,14 +137,12 @@ impl SceneResult {
     /// Whether the mean of a method's pictures is off by more than noise. The level of 5 % is shared among the methods
     /// (Šidák 1967); `None` of a single seed.
     pub fn is_biased(&self, point: &Point) -> Option<bool> {
-        let difference = point.mean_difference(&self.truth);
-        let values = point.each(|e| e.mean_difference);
-        let of_truth = self.truth.noise.map_or(0.0, |[.., variance]| variance);
-        let error = standard_error(&values)?.hypot(of_truth.sqrt());
+        let error = point.error_of_mean_difference(&self.truth)?;
+        let difference = point.mean_difference(&self.truth).value;
         let level = sidak(Interval::MISS, self.methods.len());
         Some(match error > 0.0 {
-            true => two_sided_p(difference.value / error, values.len() as f64 - 1.0) < level,
-            false => difference.value != 0.0,
+            true => two_sided_p(difference / error, point.errors.len() as f64 - 1.0) < level,
+            false => difference != 0.0,
         })
     }
 }

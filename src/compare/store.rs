@@ -3,9 +3,10 @@
 
 use super::Shot;
 use crate::check::key::digest;
-use lucerna_core::image::{Image, ReadLimits, exr};
+use crate::pictures::{write_exr, write_json};
+use lucerna_core::image::{ReadLimits, exr};
 use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// The folder.
 pub struct Store(PathBuf);
@@ -18,6 +19,15 @@ impl Store {
     pub fn open(folder: PathBuf) -> Result<Self, String> {
         std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
         Ok(Store(folder))
+    }
+
+    /// Whether a run is there and whole; the picture is not looked into.
+    pub fn has(&self, subject: &str, spp: u32, seed: u32) -> bool {
+        let path = self.path(subject, &format!("{spp} {seed}"));
+        let about = std::fs::read(path.with_extension("json")).ok();
+        let about = about.and_then(|text| serde_json::from_slice::<Value>(&text).ok()).unwrap_or_default();
+        let bytes = std::fs::metadata(path.with_extension("exr")).ok().map(|file| file.len());
+        bytes.is_some() && about["bytes"].as_u64() == bytes && about["seconds"].is_f64()
     }
 
     /// A run, if it is there and whole.
@@ -34,8 +44,11 @@ impl Store {
     /// If it cannot be written.
     pub fn keep(&self, subject: &str, seed: u32, shot: &Shot) -> Result<(), String> {
         let path = self.path(subject, &format!("{} {seed}", shot.spp));
-        write_exr(&path.with_extension("exr"), &shot.image)?;
-        write_json(&path.with_extension("json"), &json!({ "spp": shot.spp, "seed": seed, "seconds": shot.seconds }))
+        let picture = path.with_extension("exr");
+        write_exr(&picture, &shot.image)?;
+        let bytes = std::fs::metadata(&picture).map_err(|e| format!("{}: {e}", picture.display()))?.len();
+        let about = json!({ "spp": shot.spp, "seed": seed, "seconds": shot.seconds, "bytes": bytes });
+        write_json(&path.with_extension("json"), &about)
     }
 
     /// What is planned for a subject, if it is known: a list of numbers of samples per pixel.
@@ -56,24 +69,4 @@ impl Store {
         let key = format!("{subject} {what} {} {}", rayon::current_num_threads(), super::machine());
         self.0.join(&digest(key.as_bytes())[..32])
     }
-}
-
-/// Writes a picture, as a whole or not at all.
-///
-/// # Errors
-/// If it cannot be written.
-pub fn write_exr(path: &Path, image: &Image) -> Result<(), String> {
-    let part = path.with_extension("part.exr");
-    exr::write(&part, image, &exr::ExrOptions::default()).map_err(|e| format!("{}: {e}", part.display()))?;
-    std::fs::rename(&part, path).map_err(|e| format!("{}: {e}", path.display()))
-}
-
-/// Writes a document, as a whole or not at all.
-///
-/// # Errors
-/// If it cannot be written.
-pub fn write_json(path: &Path, value: &Value) -> Result<(), String> {
-    let part = path.with_extension("part");
-    std::fs::write(&part, format!("{value:#}\n")).map_err(|e| format!("{}: {e}", part.display()))?;
-    std::fs::rename(&part, path).map_err(|e| format!("{}: {e}", path.display()))
 }

@@ -4,16 +4,13 @@ use super::method::Method;
 use super::{Options, Shot};
 use crate::check::key::{digest, scene_hash};
 use crate::check::reference;
-use lucerna_core::image::Image;
-use lucerna_core::render::{Budget, Control, FilmStore, RenderContext};
+use crate::pictures::{Rendered, Source, one_line, read, render};
+use lucerna_core::render::FilmStore;
 use lucerna_core::scene::write::{WriteOptions, to_xml};
-use lucerna_core::scene::{
-    ObjectKind, Parameter, Registry, Scene, SceneErrors, Value, instantiate, resolve, upgrade, xml,
-};
+use lucerna_core::scene::{ObjectKind, Parameter, Registry, Scene, Value, instantiate};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
-use std::time::Instant;
 
 /// Memory of the largest picture in MiB, as of `render`.
 const MOST_MIB: u64 = 16_384;
@@ -44,10 +41,8 @@ impl Subject {
             reading.defines.retain(|(known, _)| known != name);
             reading.defines.push((name.clone(), value.clone()));
         }
-        let mut description = xml::load(path, &reading).map_err(|e| one_line(&e))?;
-        let content = scene_hash(path, &description.files())?;
-        resolve::resolve(&mut description).map_err(|e| one_line(&e))?;
-        upgrade::upgrade(&mut description);
+        let Source { mut description, files } = read(path, &reading).map_err(|e| one_line(&e))?;
+        let content = scene_hash(path, &files)?;
         method.apply(&mut description, registry);
         if let Some(size) = options.size {
             description.resize_films(size, "--size");
@@ -136,17 +131,8 @@ impl Subject {
     }
 
     fn render_here(&self, spp: u32, seed: u32) -> Result<Shot, String> {
-        let integrator = self.scene.integrator().ok_or("the scene has no integrator")?;
-        let camera = &self.scene.sensors()[0];
-        let control = Control::new();
-        let started = Instant::now();
-        let budget = Budget::Samples(spp);
-        let mut cx = RenderContext::new(&self.scene, camera, budget, seed, &control, integrator.aov_names());
-        integrator.render(&mut cx).map_err(|e| joined(&e.0))?;
-        let seconds = started.elapsed().as_secs_f64();
-        let (channels, data) = cx.store.develop(&cx.film);
-        let size = cx.store.size();
-        Ok(Shot { spp, seconds, image: Image { width: size.x, height: size.y, channels, data } })
+        let Rendered { image, seconds, .. } = render(&self.scene, spp, seed, |_| ()).map_err(|e| joined(&e.0))?;
+        Ok(Shot { spp, seconds, image })
     }
 }
 
@@ -157,16 +143,6 @@ fn program() -> &'static str {
         let bytes = std::env::current_exe().and_then(std::fs::read);
         bytes.map_or_else(|_| env!("CARGO_PKG_VERSION").to_owned(), |bytes| digest(&bytes))
     })
-}
-
-/// Errors of a scene as one line: the first, and how many there are.
-fn one_line(errors: &SceneErrors) -> String {
-    let first = errors.0.first().map_or_else(|| "the scene cannot be read".to_owned(), ToString::to_string);
-    let text = joined(first.strip_prefix("error: ").unwrap_or(&first));
-    match errors.0.len() {
-        0 | 1 => text,
-        count => format!("{text} (and {} more)", count - 1),
-    }
 }
 
 fn joined(text: &str) -> String {

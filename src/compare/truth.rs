@@ -5,9 +5,9 @@
 //! an MSE. It is kept in a cache after every pass, so that another comparison, or one that was killed, takes it up.
 
 use super::method::Method;
-use super::store::{write_exr, write_json};
 use super::subject::Subject;
 use super::{Options, colour, rate};
+use crate::pictures::{write_exr, write_json};
 use lucerna_core::image::{Image, ReadLimits, exr};
 use lucerna_core::scene::Registry;
 use lucerna_core::stats::metrics::{EPSILON, Seeds, errors};

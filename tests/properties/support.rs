@@ -8,6 +8,7 @@ use lucerna::core::scene::{BuiltShape, NodeId, Object, ObjectKind, Value, build_
 use lucerna::core::stats::chi2::{Chi2, pearson, sidak};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
+use std::fmt::Debug;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -90,6 +91,20 @@ pub fn failures<C: Sync>(
             (!result.accepts(level)).then(|| format!("{}: {result:?}", describe(case)))
         })
         .collect()
+}
+
+/// Whether tests have teeth: `found` tells which of them fail with an error that is planted into something right. With
+/// `none` there, none must; of each planted error all must that are listed with it.
+pub fn assert_found<E: Copy + Debug, const N: usize>(
+    found: impl Fn(E) -> [bool; N],
+    none: E,
+    planted: &[(E, &[usize])],
+) {
+    assert_eq!(found(none), [false; N]);
+    for (error, by) in planted {
+        let found = found(*error);
+        assert!(by.iter().all(|test| found[*test]), "{error:?} went unnoticed: {found:?}, not all of {by:?}");
+    }
 }
 
 /// Fails with what failed.

@@ -2,11 +2,12 @@
 #![allow(dead_code)] // Each test binary uses its part.
 
 pub mod damage;
+pub mod program;
 
 use lucerna::check::stored::{self, Entry};
 use lucerna::core::image::Image;
 use lucerna::core::render::{Budget, Control, RenderContext, Report, SampleOrder};
-use lucerna::core::scene::{Description, ObjectKind, Parameter, Scene, Value, instantiate, resolve, upgrade, xml};
+use lucerna::core::scene::{Description, ObjectKind, Parameter, Scene, Value, instantiate, xml};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
@@ -31,9 +32,7 @@ pub fn apart(section: &str, name: &str) -> Option<String> {
 /// Loads and builds a scene; panics with the scene's own messages if it cannot.
 pub fn load(path: &Path, defines: &[(String, String)], change: impl FnOnce(&mut Description)) -> Scene {
     let options = xml::LoadOptions { defines: defines.to_vec(), ..xml::LoadOptions::default() };
-    let mut description = xml::load(path, &options).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
-    resolve::resolve(&mut description).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
-    upgrade::upgrade(&mut description);
+    let mut description = xml::load_upgraded(path, &options).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     change(&mut description);
     let built = instantiate(&lucerna::builtin(), description, false);
     built.unwrap_or_else(|e| panic!("{}: {e}", path.display())).scene
@@ -42,10 +41,10 @@ pub fn load(path: &Path, defines: &[(String, String)], change: impl FnOnce(&mut 
 /// Builds a scene from text; the files it names are looked for in `folder`.
 pub fn load_text(text: &str, folder: &Path) -> Scene {
     let options = xml::LoadOptions { search_path: vec![folder.to_owned()], ..xml::LoadOptions::default() };
-    let mut description = xml::load_str(text, "scene.xml", &options).unwrap_or_else(|e| panic!("{e}"));
-    resolve::resolve(&mut description).unwrap_or_else(|e| panic!("{e}"));
-    upgrade::upgrade(&mut description);
-    instantiate(&lucerna::builtin(), description, false).unwrap_or_else(|e| panic!("{e}")).scene
+    let built = xml::load_str(text, "scene.xml", &options)
+        .and_then(xml::upgraded)
+        .and_then(|description| instantiate(&lucerna::builtin(), description, false));
+    built.unwrap_or_else(|e| panic!("{e}")).scene
 }
 
 /// The scene of a manifest entry, at the entry's size.
@@ -80,7 +79,5 @@ pub fn render_with(scene: &Scene, spp: u32, seed: u32, change: impl FnOnce(&mut 
     let mut cx = RenderContext::new(scene, &scene.sensors()[0], budget, seed, &control, integrator.aov_names());
     change(&mut cx);
     let report = integrator.render(&mut cx).expect("a picture");
-    let (channels, data) = cx.store.develop(&cx.film);
-    let size = cx.store.size();
-    (Image { width: size.x, height: size.y, channels, data }, report)
+    (cx.picture(), report)
 }

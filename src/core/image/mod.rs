@@ -58,6 +58,18 @@ impl Image {
         self.channels.iter().position(|channel| channel == name)
     }
 
+    /// The channels of these names, in this order.
+    ///
+    /// # Errors
+    /// If there is none of a name; one line.
+    pub fn pick(&self, names: &[String]) -> std::result::Result<Image, String> {
+        let find = |name: &String| self.channel(name).ok_or_else(|| format!("there is no channel \"{name}\""));
+        let order = names.iter().map(find).collect::<std::result::Result<Vec<usize>, _>>()?;
+        let pixels = self.data.chunks_exact(self.channels.len().max(1));
+        let data = pixels.flat_map(|pixel| order.iter().map(|&c| pixel[c])).collect();
+        Ok(Image { channels: names.to_vec(), data, ..*self })
+    }
+
     /// The colour at every pixel: channels `R G B`, or the only one of `Y` or the first three times.
     fn rgb(&self) -> Result<impl Iterator<Item = [f32; 3]> + '_> {
         self.check()?;

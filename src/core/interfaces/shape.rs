@@ -1,8 +1,8 @@
 //! Geometry.
 
 use super::{LightPoint, SurfaceHit};
-use crate::accel::{Geometry, Hit, Ray};
-use crate::math::{Aabb, Mat4, Vec2, Vec3};
+use crate::accel::{Geometry, Hit, Instance, Ray};
+use crate::math::{Aabb, Vec2, Vec3};
 use crate::scene::ShapeGroup;
 use std::sync::Arc;
 
@@ -90,8 +90,8 @@ pub trait Shape: Send + Sync {
         None
     }
 
-    /// The group and the matrix that takes it to the world, if this shape is an instance.
-    fn instance(&self) -> Option<(&ShapeGroup, &Mat4)> {
+    /// What is placed and where, if this shape is an instance.
+    fn instance(&self) -> Option<&Instance<ShapeGroup>> {
         None
     }
 }

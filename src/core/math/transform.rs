@@ -80,11 +80,6 @@ impl Transform {
         self.matrix == Mat4::IDENTITY
     }
 
-    /// The inverse transform.
-    pub fn inverted(&self) -> Transform {
-        Transform { matrix: self.inverse, inverse: self.matrix }
-    }
-
     /// Whether all three axes are scaled alike and stay perpendicular, to 1e-4.
     pub fn is_similarity(&self) -> bool {
         let axes = [self.matrix.x_axis, self.matrix.y_axis, self.matrix.z_axis].map(|a| a.truncate());

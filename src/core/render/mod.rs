@@ -17,6 +17,7 @@ pub use film_store::FilmStore;
 pub use reference_order::ReferenceOrder;
 pub use tiles::{render_estimator, replay};
 
+use crate::image::Image;
 use crate::interfaces::{FilmSettings, Sampler, Sensor};
 use crate::math::{UVec2, Vec2};
 use crate::scene::{BuiltSensor, Scene};
@@ -88,6 +89,13 @@ impl<'a> RenderContext<'a> {
         let seed = seed.wrapping_add(camera.sampler.seed());
         let (sensor, sampler) = (&*camera.sensor, &*camera.sampler);
         RenderContext { scene, sensor, film, sampler, budget, seed, order: SampleOrder::PerSample, control, store }
+    }
+
+    /// The picture as it is now.
+    pub fn picture(&self) -> Image {
+        let (channels, data) = self.store.develop(&self.film);
+        let size = self.store.size();
+        Image { width: size.x, height: size.y, channels, data }
     }
 
     /// The reference's order of random numbers, if it is asked for.

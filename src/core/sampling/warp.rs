@@ -28,13 +28,6 @@ fn sin_cos_of_eighth(x: f32) -> (f32, f32) {
     (x + x * sin, 1.0 + cos)
 }
 
-/// The unit square to the unit disk by radius and angle: uniform in area.
-#[inline]
-pub fn square_to_disk_polar(u: Vec2) -> Vec2 {
-    let (sin, cos) = (TAU * u.x).sin_cos();
-    safe_sqrt(u.y) * Vec2::new(cos, sin)
-}
-
 /// Cosine-weighted direction about +z; density [`cosine_hemisphere_pdf`].
 #[inline]
 pub fn square_to_cosine_hemisphere(u: Vec2) -> Vec3 {
@@ -65,22 +58,6 @@ pub const SPHERE_PDF: f32 = 0.25 * FRAC_1_PI;
 pub fn square_to_triangle(u: Vec2) -> Vec2 {
     let t = safe_sqrt(1.0 - u.x);
     Vec2::new(1.0 - t, t * u.y)
-}
-
-/// Density of [`square_to_cone`] per solid angle, for a cone of the given cosine of its half angle.
-#[inline]
-pub fn cone_pdf(cos_cutoff: f32) -> f32 {
-    1.0 / (TAU * (1.0 - cos_cutoff))
-}
-
-/// Uniform direction in a cone about +z.
-#[inline]
-pub fn square_to_cone(u: Vec2, cos_cutoff: f32) -> Vec3 {
-    let p = square_to_disk_concentric(u);
-    let pn = p.length_squared();
-    let z = cos_cutoff + (1.0 - cos_cutoff) * (1.0 - pn);
-    let p = p * safe_sqrt((1.0 - cos_cutoff) * (2.0 - pn * (1.0 - cos_cutoff)));
-    p.extend(z)
 }
 
 /// [0, 1] to [−1, 1] with density `1 − |x|`.

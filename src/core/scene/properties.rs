@@ -325,14 +325,6 @@ impl<'a> Properties<'a> {
         }
     }
 
-    /// A spectrum as written, for plugins that treat it in their own way.
-    pub fn spectrum_opt(&self, name: &str) -> Option<&SpectrumValue> {
-        match self.value(name) {
-            Some(Value::Spectrum(s)) => Some(s),
-            _ => None,
-        }
-    }
-
     /// An index of refraction: a number or the name of a material.
     pub fn ior(&self, name: &str) -> Result<f32, Failed> {
         match self.value(name) {

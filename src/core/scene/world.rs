@@ -2,7 +2,6 @@
 
 use super::object::{BuiltSensor, BuiltShape};
 use crate::accel::{Accel, BuildOptions, Geometry, Hit, NO_INSTANCE, NO_TRIANGLE, Ray};
-use crate::color::Rgb;
 use crate::interfaces::{Bsdf, Emitter, EmitterFlags, Integrator, LightPoint, LightSample, SurfaceHit};
 use crate::math::{ONE_MINUS_EPSILON, Transform, Vec2, Vec3};
 use crate::sampling::Discrete;
@@ -18,18 +17,24 @@ const NO_EMITTER: u32 = u32::MAX;
 /// Shapes that are placed many times by instances. Has no lights.
 pub struct ShapeGroup {
     shapes: Vec<BuiltShape>,
-    accel: Arc<Accel>,
+    accel: Accel,
+}
+
+impl AsRef<Accel> for ShapeGroup {
+    fn as_ref(&self) -> &Accel {
+        &self.accel
+    }
 }
 
 impl ShapeGroup {
     /// Builds the acceleration structure over the shapes.
     pub fn new(shapes: Vec<BuiltShape>) -> Result<Self, String> {
-        let accel = Arc::new(build_accel(&shapes)?);
+        let accel = build_accel(&shapes)?;
         Ok(ShapeGroup { shapes, accel })
     }
 
     /// The acceleration structure, in the group's own space.
-    pub fn accel(&self) -> &Arc<Accel> {
+    pub fn accel(&self) -> &Accel {
         &self.accel
     }
 
@@ -148,13 +153,6 @@ impl Scene {
         self.accel.occluded(ray)
     }
 
-    /// Whether the segment between two points is blocked. `from` has already been moved off its surface; `to` lies on
-    /// a surface with the given error bound and normal.
-    #[inline]
-    pub fn segment_occluded(&self, from: Vec3, to: Vec3) -> bool {
-        self.occluded(&Ray::between(from, to))
-    }
-
     /// The nearest hit in full.
     #[inline]
     pub fn intersect_surface(&self, ray: &Ray) -> Option<SurfaceHit> {
@@ -213,18 +211,10 @@ impl Scene {
     fn instance_surface(&self, ray: &Ray, hit: &Hit, surface: &mut SurfaceHit) {
         let instance = &self.shapes[hit.instance as usize].shape;
         match instance.instance() {
-            Some((group, matrix)) => {
-                // Kept without its inverse, for there may be millions; all that are built have one.
-                let to_world = Transform::new(matrix.as_dmat4()).unwrap_or_default();
-                let local = Ray {
-                    o: to_world.inverse_point(ray.o),
-                    d: to_world.inverse_vector(ray.d),
-                    t_min: ray.t_min,
-                    t_max: ray.t_max,
-                    ends: [NO_TRIANGLE; 2],
-                };
-                group.shapes[hit.shape as usize].shape.surface(&local, hit, surface);
-                *surface = transform_hit(surface, &to_world);
+            Some(instance) => {
+                let shape = &instance.group().shapes[hit.shape as usize].shape;
+                shape.surface(&instance.local(ray), hit, surface);
+                *surface = transform_hit(surface, &instance.to_world());
             }
             None => instance.surface(ray, hit, surface),
         }
@@ -235,7 +225,7 @@ impl Scene {
             return &self.shapes[hit.shape as usize];
         }
         match self.shapes[hit.instance as usize].shape.instance() {
-            Some((group, _)) => &group.shapes[hit.shape as usize],
+            Some(instance) => &instance.group().shapes[hit.shape as usize],
             None => &self.shapes[hit.instance as usize],
         }
     }
@@ -352,12 +342,6 @@ impl Scene {
     #[inline]
     pub fn visible(&self, hit: &SurfaceHit, light: &LightSample) -> bool {
         !self.occluded(&shadow_ray(hit, light))
-    }
-
-    /// Radiance from where a ray goes that hits nothing.
-    #[inline]
-    pub fn background(&self, d: Vec3) -> Rgb {
-        self.environment.map_or(Rgb::BLACK, |id| self.emitter(id).background(d))
     }
 }
 

@@ -124,11 +124,7 @@ fn pick(image: &Image, size: [u32; 2], channels: &[String]) -> Result<Vec<f64>, 
         let [width, height] = size;
         return Err(format!("{} x {} pixels instead of {width} x {height}", image.width, image.height));
     }
-    let order: Vec<usize> = (channels.iter())
-        .map(|name| image.channel(name).ok_or_else(|| format!("there is no channel \"{name}\"")))
-        .collect::<Result<_, _>>()?;
-    let pixels = image.data.chunks_exact(image.channels.len().max(1));
-    Ok(pixels.flat_map(|pixel| order.iter().map(|&c| f64::from(pixel[c]))).collect())
+    Ok(image.pick(channels)?.data.into_iter().map(f64::from).collect())
 }
 
 /// Number of tiles in a row and in a column.

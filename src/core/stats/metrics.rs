@@ -6,15 +6,15 @@
 //! | measure | formula | ε | source |
 //! |---|---|---|---|
 //! | MSE | mean (x − r)² | | |
-//! | relMSE | mean (x − r)² / (r² + ε) | 0.01 | Rousselle, Knaus and Zwicker 2012 (the form; ε differs between papers) |
+//! | relMSE | mean (x − r)² / (r² + ε) | 0.01 | Rousselle, Knaus and Zwicker 2011, in form; ε differs between papers |
 //! | relMSE trimmed | the same without the 0.1 % of pixels where it is largest, at least one | 0.01 | |
-//! | MAPE | mean abs(x − r) / (abs r + ε) | 0.01 | Müller, McWilliams, Rousselle, Gross and Novák 2019 |
-//! | SMAPE | mean abs(x − r) / (abs x + abs r + ε), at most 1 | 0.01 | Vogels et al. 2018 |
+//! | MAPE | mean abs(x − r) / (abs r + ε) | 0.01 | common; ε differs between papers |
+//! | SMAPE | mean abs(x − r) / (abs x + abs r + ε), at most 1 | 0.01 | common; ε and a factor of 2 differ between papers |
 //! | bias² | see [`Seeds::bias_squared`] | | |
-//! | efficiency | 1 / (error · seconds) | | Hammersley and Handscomb 1964, chapter 5 |
+//! | efficiency | 1 / (error · seconds) | | Pharr, Jakob and Humphreys 2023, section 2.2, there with the variance |
 //!
 //! ε is in units of radiance (its square for relMSE): it is as good as nothing where pictures are about as bright as 1.
-//! FLIP is not among them: there is no implementation in Rust, only a wrapper around a C++ library.
+//! FLIP (Andersson et al. 2020), which is about how differences look, is not among them.
 
 use super::student::critical_t;
 

@@ -3,13 +3,14 @@
 /// Chance of a |t| at least as large with `freedom` degrees of freedom (which need not be whole) if there is no
 /// difference: the regularised incomplete beta function I(ν / (ν + t²); ν/2, 1/2). 0 for infinite and NaN `t`.
 pub fn two_sided_p(t: f64, freedom: f64) -> f64 {
-    if !t.is_finite() {
+    let square = t * t;
+    if !square.is_finite() {
         return 0.0;
     }
-    let x = freedom / (freedom + t * t);
+    let x = freedom / (freedom + square);
     let (a, b) = (0.5 * freedom, 0.5);
     // 1 − x as a quotient of its own: it may be far below the rounding of x.
-    let rest = t * t / (freedom + t * t);
+    let rest = square / (freedom + square);
     if rest == 0.0 {
         return 1.0;
     }
@@ -110,5 +111,6 @@ mod tests {
         // 1 − t/√(2 + t²) ≈ 1/t² far out.
         assert!((two_sided_p(1e8, 2.0) / 1e-16 - 1.0).abs() < 1e-6);
         assert_eq!((two_sided_p(0.0, 5.0), two_sided_p(f64::INFINITY, 5.0)), (1.0, 0.0));
+        assert_eq!((two_sided_p(1e200, 5.0), two_sided_p(f64::NAN, 5.0)), (0.0, 0.0));
     }
 }

@@ -1,7 +1,7 @@
 //! The tests find errors that are planted into right emitters.
 
 use super::*;
-use crate::support::SIGNIFICANCE;
+use crate::support::{SIGNIFICANCE, assert_found};
 use lucerna::core::interfaces::{LightSample, SurfaceHit};
 use lucerna::core::stats::chi2::sidak;
 
@@ -81,15 +81,12 @@ fn found(error: Error) -> [bool; 5] {
 
 #[test]
 fn planted_errors_are_found() {
-    assert_eq!(found(Error::None), [false; 5]);
-    for (error, by) in [
-        (Error::Density, [1, 3]),
-        (Error::BothDensities, [0, 2]),
-        (Error::Samples, [0, 2]),
-        (Error::Weight, [1, 3]),
-        (Error::Falloff, [4, 4]),
-    ] {
-        let found = found(error);
-        assert!(by.iter().all(|test| found[*test]), "{error:?} went unnoticed: {found:?}, not all of {by:?}");
-    }
+    let planted: &[(Error, &[usize])] = &[
+        (Error::Density, &[1, 3]),
+        (Error::BothDensities, &[0, 2]),
+        (Error::Samples, &[0, 2]),
+        (Error::Weight, &[1, 3]),
+        (Error::Falloff, &[4]),
+    ];
+    assert_found(found, Error::None, planted);
 }

@@ -1,6 +1,7 @@
 //! The tests find errors that are planted into a right shape.
 
 use super::*;
+use crate::support::assert_found;
 use lucerna::core::accel::{Geometry, Hit};
 use lucerna::core::interfaces::{AreaSample, LightPoint};
 use lucerna::core::math::Aabb;
@@ -90,15 +91,13 @@ fn planted_errors_are_found() {
             misfit(&traced).is_some(),
         ]
     };
-    assert_eq!(found(Error::None), [false; 5]);
-    for (error, by) in [
-        (Error::Coordinates, 0),
-        (Error::Area, 1),
-        (Error::Samples, 2),
-        (Error::Density, 3),
-        (Error::Tangent, 4),
-        (Error::Normal, 4),
-    ] {
-        assert!(found(error)[by], "{error:?} went unnoticed by test {by}");
-    }
+    let planted: &[(Error, &[usize])] = &[
+        (Error::Coordinates, &[0]),
+        (Error::Area, &[1]),
+        (Error::Samples, &[2]),
+        (Error::Density, &[3]),
+        (Error::Tangent, &[4]),
+        (Error::Normal, &[4]),
+    ];
+    assert_found(found, Error::None, planted);
 }

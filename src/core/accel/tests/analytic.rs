@@ -75,7 +75,7 @@ fn hc_g17_instances_equal_moved_copies() {
         .iter()
         .enumerate()
         .map(|(i, (scale, offset))| {
-            let to_world = glam::Affine3A::from_mat3_translation(glam::Mat3::from_diagonal(*scale), *offset);
+            let to_world = glam::Mat4::from_translation(*offset) * glam::Mat4::from_scale(*scale);
             let instance = Instance::new(Arc::clone(&group), to_world).unwrap();
             (i as u32, Geometry::Analytic(Arc::new(instance) as _))
         })
@@ -97,9 +97,9 @@ fn hc_g17_instances_equal_moved_copies() {
         assert_eq!(accel.occluded(&ray), expected.is_some());
     }
 
-    let nested = Instance::new(Arc::new(accel), glam::Affine3A::IDENTITY).err();
+    let nested = Instance::new(Arc::new(accel), glam::Mat4::IDENTITY).err();
     assert_eq!(nested.as_deref(), Some("an instance of a group that contains instances is not supported"));
-    let flat = Instance::new(group, glam::Affine3A::from_scale(Vec3::new(1.0, 1.0, 0.0))).err();
+    let flat = Instance::new(group, glam::Mat4::from_scale(Vec3::new(1.0, 1.0, 0.0))).err();
     assert_eq!(flat.as_deref(), Some("the transform of an instance must be invertible"));
 }
 

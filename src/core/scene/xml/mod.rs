@@ -73,13 +73,20 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Description, SceneErro
     loader::load(loader::Main::File(path), options)
 }
 
-/// Reads a scene file and makes it ready to be instantiated: [`load`], [`resolve`](super::resolve::resolve),
+/// Reads a scene file and makes it ready to be instantiated: [`load`] and [`upgraded`].
+///
+/// # Errors
+/// As those two.
+pub fn load_upgraded(path: &Path, options: &LoadOptions) -> Result<Description, SceneErrors> {
+    upgraded(load(path, options)?)
+}
+
+/// A scene that was read, ready to be instantiated: [`resolve`](super::resolve::resolve),
 /// [`upgrade`](super::upgrade::upgrade).
 ///
 /// # Errors
-/// As [`load`].
-pub fn load_upgraded(path: &Path, options: &LoadOptions) -> Result<Description, SceneErrors> {
-    let mut description = load(path, options)?;
+/// As `resolve`.
+pub fn upgraded(mut description: Description) -> Result<Description, SceneErrors> {
     super::resolve::resolve(&mut description)?;
     super::upgrade::upgrade(&mut description);
     Ok(description)
