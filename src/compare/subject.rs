@@ -48,7 +48,7 @@ impl Subject {
         let content = scene_hash(path, &description.files())?;
         resolve::resolve(&mut description).map_err(|e| one_line(&e))?;
         upgrade::upgrade(&mut description);
-        method.apply(&mut description, registry);
+        method.apply(&mut description, registry)?;
         if let Some(size) = options.size {
             description.resize_films(size, "--size");
         }
@@ -56,7 +56,7 @@ impl Subject {
         let text = to_xml(&description, &WriteOptions { for_reference, folder: None });
         let peer = match &method.variant {
             Some(variant) => {
-                for node in method.integrator.iter().chain(&method.sampler) {
+                for node in method.integrator.iter().chain(&method.sampler).chain(&method.light_sampler) {
                     if !text.contains(&format!("type=\"{}\"", node.plugin)) {
                         return Err(format!("the reference has no {} \"{}\"", node.kind.tag(), node.plugin));
                     }
