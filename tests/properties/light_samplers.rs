@@ -1,7 +1,7 @@
 //! Light samplers: chances add up, are those of the choices made, and are never zero where light could arrive.
 
 use crate::support::{assert_every_plugin_is_configured, assert_none, failures, light_sampler, plugin_of, uniform};
-use lucerna::core::interfaces::{Light, LightPoint, LightSelection, LightVertex};
+use lucerna::core::interfaces::{Light, LightPoint, LightSample, LightSelection, LightVertex};
 use lucerna::core::math::{Vec2, Vec3};
 use lucerna::core::sampling::{Pcg32, Stream};
 use lucerna::core::scene::xml::{LoadOptions, load_str};
@@ -11,7 +11,13 @@ use std::fmt::Write;
 use std::path::Path;
 
 /// The table: light samplers to test.
-const CONFIGURATIONS: &[&str] = &["<light_sampler type='uniform'/>", "<light_sampler type='power'/>"];
+const CONFIGURATIONS: &[&str] = &[
+    "<light_sampler type='uniform'/>",
+    "<light_sampler type='power'/>",
+    "<light_sampler type='light_tree'/>",
+    "<light_sampler type='ris'/>",
+    "<light_sampler type='ris'><integer name='candidates' value='3'/><light_sampler type='power'/></light_sampler>",
+];
 
 #[test]
 fn every_light_sampler_is_configured() {
@@ -245,7 +251,7 @@ fn densities_are_those_of_the_samples() {
         for (xml, selection) in prepared(&scene) {
             let mut stream = Stream::independent(Pcg32::new(4, 4));
             for from in vertices(&scene, 300) {
-                let worth = |sample: &lucerna::core::interfaces::LightSample| sample.weight.luminance();
+                let worth = |sample: &LightSample| sample.weight.luminance();
                 let Some(sample) = selection.sample(&scene, &from, &mut stream, &worth) else { continue };
                 if sample.delta {
                     continue;
@@ -301,4 +307,55 @@ fn parts_of_hits_are_those_of_samples() {
         found += 1;
     }
     assert!(found > 20, "{found}");
+}
+
+/// Mean light at a vertex and its standard error, for weights that are a partition of unity with some other estimator.
+fn mean_light(
+    scene: &Scene,
+    selection: &dyn LightSelection,
+    from: &LightVertex,
+    part: impl Fn(f32) -> f32,
+) -> [f64; 2] {
+    let mut stream = Stream::independent(Pcg32::new(8, 2));
+    let (count, mut sum, mut squares) = (20_000, 0.0, 0.0);
+    for _ in 0..count {
+        // As a path does: the weight against another estimator, whose density is known, counts in what a sample is worth.
+        let arriving = |sample: &LightSample| {
+            let cos = if from.n == Vec3::ZERO { 1.0 } else { from.n.dot(sample.point.d).max(0.0) };
+            let weight = if sample.delta { 1.0 } else { part(sample.pdf) };
+            sample.weight.luminance() * cos * weight
+        };
+        let found =
+            selection.sample(scene, from, &mut stream, &arriving).map_or(0.0, |sample| f64::from(arriving(&sample)));
+        (sum, squares) = (sum + found, squares + found * found);
+    }
+    let mean = sum / f64::from(count);
+    [mean, ((squares / f64::from(count) - mean * mean).max(0.0) / f64::from(count)).sqrt()]
+}
+
+/// All light samplers find the same light: what one of them gets wrong, by chance, weight or density, would show.
+#[test]
+fn all_find_the_same_light() {
+    let (mut wrong, mut compared, mut lit) = (Vec::new(), 0, 0);
+    for (name, scene) in scenes() {
+        if name == "far and faint" {
+            // Of a light with nearly all the power, and a chance that is all but zero, nobody tells a mean by sampling.
+            continue;
+        }
+        let selections = prepared(&scene);
+        for from in vertices(&scene, 12).into_iter().skip(1).step_by(2) {
+            let means: Vec<_> = selections.iter().map(|(_, s)| mean_light(&scene, &**s, &from, |_| 1.0)).collect();
+            lit += u32::from(means[0][0] > 0.0);
+            for (i, [mean, error]) in means.iter().enumerate().skip(1) {
+                let [expected, other] = means[0];
+                let sigma = error.hypot(other) + 1e-4 * expected;
+                compared += 1;
+                if (mean - expected).abs() > 4.5 * sigma {
+                    wrong.push(format!("{name}, {}, {from:?}: {mean}, not {expected} ± {sigma}", selections[i].0));
+                }
+            }
+        }
+    }
+    assert_none(&wrong);
+    assert!(compared > 150 && lit > 30, "{compared} {lit}");
 }
