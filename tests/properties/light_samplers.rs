@@ -309,24 +309,17 @@ fn parts_of_hits_are_those_of_samples() {
     assert!(found > 20, "{found}");
 }
 
-/// Mean light at a vertex and its standard error, for weights that are a partition of unity with some other estimator.
-fn mean_light(
-    scene: &Scene,
-    selection: &dyn LightSelection,
-    from: &LightVertex,
-    part: impl Fn(f32) -> f32,
-) -> [f64; 2] {
+/// Mean irradiance at a vertex, nothing in between, and its standard error.
+fn mean_light(scene: &Scene, selection: &dyn LightSelection, from: &LightVertex) -> [f64; 2] {
     let mut stream = Stream::independent(Pcg32::new(8, 2));
     let (count, mut sum, mut squares) = (20_000, 0.0, 0.0);
     for _ in 0..count {
-        // As a path does: the weight against another estimator, whose density is known, counts in what a sample is worth.
         let arriving = |sample: &LightSample| {
             let cos = if from.n == Vec3::ZERO { 1.0 } else { from.n.dot(sample.point.d).max(0.0) };
-            let weight = if sample.delta { 1.0 } else { part(sample.pdf) };
-            sample.weight.luminance() * cos * weight
+            sample.weight.luminance() * cos
         };
-        let found =
-            selection.sample(scene, from, &mut stream, &arriving).map_or(0.0, |sample| f64::from(arriving(&sample)));
+        let sample = selection.sample(scene, from, &mut stream, &arriving);
+        let found = sample.map_or(0.0, |sample| f64::from(arriving(&sample)));
         (sum, squares) = (sum + found, squares + found * found);
     }
     let mean = sum / f64::from(count);
@@ -344,7 +337,7 @@ fn all_find_the_same_light() {
         }
         let selections = prepared(&scene);
         for from in vertices(&scene, 12).into_iter().skip(1).step_by(2) {
-            let means: Vec<_> = selections.iter().map(|(_, s)| mean_light(&scene, &**s, &from, |_| 1.0)).collect();
+            let means: Vec<_> = selections.iter().map(|(_, s)| mean_light(&scene, &**s, &from)).collect();
             lit += u32::from(means[0][0] > 0.0);
             for (i, [mean, error]) in means.iter().enumerate().skip(1) {
                 let [expected, other] = means[0];
