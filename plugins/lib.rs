@@ -8,6 +8,7 @@ pub mod bsdfs;
 pub mod emitters;
 pub mod films;
 pub mod integrators;
+pub mod light_samplers;
 pub mod rfilters;
 pub mod samplers;
 pub mod sensors;
@@ -28,6 +29,7 @@ pub fn builtin() -> Registry {
         .add_all(films::PLUGINS)
         .add_all(rfilters::PLUGINS)
         .add_all(samplers::PLUGINS)
+        .add_all(light_samplers::PLUGINS)
         .add_all(emitters::PLUGINS)
         .add_all(shapes::PLUGINS)
         .add_all(bsdfs::PLUGINS)

@@ -19,14 +19,15 @@
 //! ```
 
 use super::COMMON;
+use lucerna_core::accel::Geometry;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{
-    AreaSample, ColorSource, Emitter, EmitterFlags, LightPoint, LightSample, Shape, SurfaceHit, Texture,
+    AreaSample, ColorSource, Emitter, EmitterFlags, LightBounds, LightPoint, LightSample, Shape, SurfaceHit, Texture,
 };
-use lucerna_core::math::{Frame, Vec2, Vec3};
+use lucerna_core::math::{Aabb, Frame, Vec2, Vec3};
 use lucerna_core::sampling::Pcg32;
 use lucerna_core::scene::{Built, Constructor, Param, Plugin, Properties, Slot};
-use std::f32::consts::PI;
+use std::f32::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
 
 /// Table entry.
@@ -53,10 +54,13 @@ fn build(p: &Properties<'_>) -> Built<dyn Emitter> {
     }
     let (shape, sampling_weight) = (shape.clone(), p.float("sampling_weight"));
     Ok(match p.color("radiance") {
-        ColorSource::Constant(radiance) => Arc::new(Plain { shape, radiance, sampling_weight }),
+        ColorSource::Constant(radiance) => {
+            Arc::new(Plain { parts: part_count(&*shape), shape, radiance, sampling_weight })
+        }
         ColorSource::Textured(radiance) => {
             let by_texture = is_one_to_one(&*shape);
-            Arc::new(Textured { shape, radiance, by_texture, sampling_weight })
+            let parts = if by_texture { 1 } else { part_count(&*shape) };
+            Arc::new(Textured { shape, radiance, by_texture, parts, sampling_weight })
         }
     })
 }
@@ -73,6 +77,29 @@ fn is_one_to_one(shape: &dyn Shape) -> bool {
     })
 }
 
+/// Triangles that can be sampled apart: those of a mesh. Other shapes are whole, also if they are traced as triangles.
+fn part_count(shape: &dyn Shape) -> u32 {
+    let has_triangles =
+        (0..shape.primitive_count() as u32).any(|i| shape.sample_triangle(i, Vec2::splat(0.5)).is_some());
+    if has_triangles { shape.primitive_count() as u32 } else { 1 }
+}
+
+/// Bounds of a part of a light that gives off this radiance.
+fn part_bounds(shape: &dyn Shape, parts: u32, part: u32, radiance: f32) -> Option<LightBounds> {
+    let (bounds, area, (axis, theta_o)) = match (parts, shape.geometry()) {
+        (2.., Geometry::Mesh { positions, triangles }) => {
+            let corners = triangles.get(part as usize)?.map(|i| positions[i as usize]);
+            let sample = shape.sample_triangle(part, Vec2::splat(0.5));
+            let (area, n) = sample.map_or((0.0, Vec3::Z), |sample| (1.0 / sample.pdf, sample.n));
+            (Aabb::of_points(corners), area, (n, 0.0))
+        }
+        _ => (shape.bounds(), shape.area(), shape.normal_cone()),
+    };
+    // Seen from its front a flat light has its whole area, a convex one from anywhere a quarter of it (Cauchy 1832).
+    let seen = if theta_o < FRAC_PI_2 { area } else { 0.25 * area };
+    Some(LightBounds { bounds, axis, theta_o, theta_e: FRAC_PI_2, intensity: seen * radiance })
+}
+
 /// Whether a light point shows its front to the point it is seen from.
 fn faces(point: &LightPoint) -> bool {
     point.d.dot(point.n) < 0.0
@@ -81,6 +108,7 @@ fn faces(point: &LightPoint) -> bool {
 /// The same radiance everywhere.
 struct Plain {
     shape: Arc<dyn Shape>,
+    parts: u32,
     radiance: Rgb,
     sampling_weight: f32,
 }
@@ -109,6 +137,28 @@ impl Emitter for Plain {
         if faces(point) { self.shape.pdf_direct(from, point) } else { 0.0 }
     }
 
+    fn part_count(&self) -> u32 {
+        self.parts
+    }
+
+    fn part_bounds(&self, part: u32) -> Option<LightBounds> {
+        part_bounds(&*self.shape, self.parts, part, self.radiance.luminance())
+    }
+
+    fn sample_part(&self, part: u32, from: Vec3, u2: Vec2) -> Option<LightSample> {
+        if self.parts == 1 {
+            return self.sample_direct(from, u2);
+        }
+        let sample = self.shape.sample_triangle(part, u2)?;
+        let (point, pdf) = sample.as_seen_from(from)?;
+        let weight = self.radiance / pdf;
+        faces(&point).then_some(LightSample { point, p_error: sample.p_error, pdf, weight, delta: false })
+    }
+
+    fn pdf_part(&self, part: u32, from: Vec3, point: &LightPoint) -> f32 {
+        if self.parts == 1 { self.pdf_direct(from, point) } else { pdf_of_triangle(&*self.shape, part, point) }
+    }
+
     fn radiance(&self, hit: &SurfaceHit) -> Rgb {
         if hit.wi.z > 0.0 { self.radiance } else { Rgb::BLACK }
     }
@@ -124,7 +174,23 @@ struct Textured {
     radiance: Arc<dyn Texture>,
     /// Sample the texture, not the area.
     by_texture: bool,
+    /// More than one only where the shape is sampled by area: what belongs to a triangle of a texture is not known.
+    parts: u32,
     sampling_weight: f32,
+}
+
+/// What a texture needs to know of a sampled point.
+fn as_hit(sample: &AreaSample) -> SurfaceHit {
+    let frame = Frame::from_normal(sample.n);
+    SurfaceHit { p: sample.p, n: sample.n, frame, uv: sample.uv, ..SurfaceHit::default() }
+}
+
+/// Density per solid angle of a point of a triangle that is sampled by area.
+fn pdf_of_triangle(shape: &dyn Shape, triangle: u32, point: &LightPoint) -> f32 {
+    // Any point of the triangle has the same density per area.
+    let pdf_area = shape.sample_triangle(triangle, Vec2::splat(0.5)).map_or(0.0, |sample| sample.pdf);
+    let pdf = pdf_area * point.distance * point.distance / point.d.dot(point.n).abs();
+    if faces(point) && pdf.is_finite() { pdf } else { 0.0 }
 }
 
 /// Density per unit area of the surface for one per unit area of texture coordinates.
@@ -143,9 +209,13 @@ impl Textured {
             Some((AreaSample { p, p_error, n, uv, pdf, triangle }, hit))
         } else {
             let sample = self.shape.sample_area(u2)?;
-            let frame = Frame::from_normal(sample.n);
-            Some((sample, SurfaceHit { p: sample.p, n: sample.n, frame, uv: sample.uv, ..SurfaceHit::default() }))
+            Some((sample, as_hit(&sample)))
         }
+    }
+
+    fn sample_of(&self, point: LightPoint, sample: &AreaSample, pdf: f32, hit: &SurfaceHit) -> LightSample {
+        let weight = self.radiance.color(hit) / pdf;
+        LightSample { point, p_error: sample.p_error, pdf, weight, delta: false }
     }
 }
 
@@ -161,13 +231,7 @@ impl Emitter for Textured {
     fn sample_direct(&self, from: Vec3, u2: Vec2) -> Option<LightSample> {
         let (sample, hit) = self.sample_surface(u2)?;
         let (point, pdf) = sample.as_seen_from(from)?;
-        faces(&point).then(|| LightSample {
-            point,
-            p_error: sample.p_error,
-            pdf,
-            weight: self.radiance.color(&hit) / pdf,
-            delta: false,
-        })
+        faces(&point).then(|| self.sample_of(point, &sample, pdf, &hit))
     }
 
     fn pdf_direct(&self, _from: Vec3, point: &LightPoint) -> f32 {
@@ -182,6 +246,27 @@ impl Emitter for Textured {
         };
         let pdf = pdf * point.distance * point.distance / point.d.dot(point.n).abs();
         if pdf.is_finite() { pdf } else { 0.0 }
+    }
+
+    fn part_count(&self) -> u32 {
+        self.parts
+    }
+
+    fn part_bounds(&self, part: u32) -> Option<LightBounds> {
+        part_bounds(&*self.shape, self.parts, part, self.radiance.mean())
+    }
+
+    fn sample_part(&self, part: u32, from: Vec3, u2: Vec2) -> Option<LightSample> {
+        if self.parts == 1 {
+            return self.sample_direct(from, u2);
+        }
+        let sample = self.shape.sample_triangle(part, u2)?;
+        let (point, pdf) = sample.as_seen_from(from)?;
+        faces(&point).then(|| self.sample_of(point, &sample, pdf, &as_hit(&sample)))
+    }
+
+    fn pdf_part(&self, part: u32, from: Vec3, point: &LightPoint) -> f32 {
+        if self.parts == 1 { self.pdf_direct(from, point) } else { pdf_of_triangle(&*self.shape, part, point) }
     }
 
     fn radiance(&self, hit: &SurfaceHit) -> Rgb {
@@ -260,12 +345,12 @@ mod tests {
         let shape: Arc<dyn Shape> = Arc::new(Rectangle { invertible });
         let by_texture = is_one_to_one(&*shape);
         assert_eq!(by_texture, invertible);
-        Textured { shape, radiance, by_texture, sampling_weight: 1.0 }
+        Textured { shape, radiance, by_texture, parts: 1, sampling_weight: 1.0 }
     }
 
     fn plain() -> Plain {
         let shape = Arc::new(Rectangle { invertible: false });
-        Plain { shape, radiance: Rgb::new(3.0, 2.0, 1.0), sampling_weight: 1.0 }
+        Plain { shape, parts: 1, radiance: Rgb::new(3.0, 2.0, 1.0), sampling_weight: 1.0 }
     }
 
     #[test]

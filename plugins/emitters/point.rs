@@ -17,8 +17,8 @@
 use super::COMMON;
 use lucerna_core::accel::NO_TRIANGLE;
 use lucerna_core::color::Rgb;
-use lucerna_core::interfaces::{Emitter, EmitterFlags, LightPoint, LightSample};
-use lucerna_core::math::{Vec2, Vec3};
+use lucerna_core::interfaces::{Emitter, EmitterFlags, LightBounds, LightPoint, LightSample};
+use lucerna_core::math::{Aabb, Vec2, Vec3};
 use lucerna_core::scene::{Built, Constructor, Param, Plugin, Properties, Slot};
 use std::f32::consts::PI;
 use std::sync::Arc;
@@ -80,6 +80,11 @@ impl Emitter for Point {
 
     fn pdf_direct(&self, _from: Vec3, _point: &LightPoint) -> f32 {
         0.0
+    }
+
+    fn part_bounds(&self, _part: u32) -> Option<LightBounds> {
+        let bounds = Aabb::of_points([self.position]);
+        Some(LightBounds { bounds, axis: Vec3::Z, theta_o: PI, theta_e: 0.0, intensity: self.intensity.luminance() })
     }
 
     fn power(&self, _scene_center: Vec3, _scene_radius: f32) -> f32 {

@@ -23,8 +23,10 @@
 
 use super::{COMMON, point};
 use lucerna_core::color::Rgb;
-use lucerna_core::interfaces::{ColorSource, Emitter, EmitterFlags, LightPoint, LightSample, SurfaceHit, Texture};
-use lucerna_core::math::{Transform, Vec2, Vec3};
+use lucerna_core::interfaces::{
+    ColorSource, Emitter, EmitterFlags, LightBounds, LightPoint, LightSample, SurfaceHit, Texture,
+};
+use lucerna_core::math::{Aabb, Transform, Vec2, Vec3};
 use lucerna_core::scene::{Built, Constructor, Param, Plugin, Properties, Slot};
 use std::f32::consts::TAU;
 use std::sync::Arc;
@@ -141,6 +143,17 @@ impl Emitter for Spot {
 
     fn pdf_direct(&self, _from: Vec3, _point: &LightPoint) -> f32 {
         0.0
+    }
+
+    fn part_bounds(&self, _part: u32) -> Option<LightBounds> {
+        let slide = self.texture.as_ref().map_or(1.0, |texture| texture.mean());
+        Some(LightBounds {
+            bounds: Aabb::of_points([self.to_world.point(Vec3::ZERO)]),
+            axis: self.to_world.vector(Vec3::Z).normalize_or_zero(),
+            theta_o: self.beam,
+            theta_e: self.cutoff - self.beam,
+            intensity: self.intensity.luminance() * slide,
+        })
     }
 
     fn power(&self, _scene_center: Vec3, _scene_radius: f32) -> f32 {

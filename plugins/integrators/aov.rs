@@ -98,16 +98,22 @@ fn build(p: &Properties<'_>) -> Built<dyn Integrator> {
     Ok(Arc::new(Aov { nested, kinds, names, timeout: timeout(p) }))
 }
 
-struct Aov {
-    nested: Vec<Nested>,
+struct Aov<'a> {
+    nested: Vec<Nested<'a>>,
     kinds: Vec<Kind>,
     names: Vec<String>,
     timeout: Option<f64>,
 }
 
-forward_integrator!(Aov, |this| this.names.clone());
+forward_integrator!(Aov<'static>, |this| this.names.clone());
 
-impl RadianceEstimator for Aov {
+impl RadianceEstimator for Aov<'_> {
+    fn prepare(&self, scene: &Scene) -> Option<Box<dyn RadianceEstimator + '_>> {
+        let nested = Nested::prepare(&self.nested, scene)?;
+        let (kinds, names) = (self.kinds.clone(), self.names.clone());
+        Some(Box::new(Aov { nested, kinds, names, timeout: self.timeout }))
+    }
+
     fn wants_differentials(&self) -> bool {
         let own = self.kinds.iter().any(|kind| matches!(kind, Kind::DuvDx | Kind::DuvDy));
         own || Nested::want_differentials(&self.nested)

@@ -1,9 +1,10 @@
 //! What integrators share: common parameters, multiple importance sampling, light that a ray runs into.
 
+use super::lights::PickLights;
 use lucerna_core::accel::Ray;
 use lucerna_core::color::Rgb;
-use lucerna_core::interfaces::{EmitterFlags, Integrator, LightPoint, RadianceEstimator, SurfaceHit};
-use lucerna_core::math::{Vec2, Vec3};
+use lucerna_core::interfaces::{EmitterFlags, Integrator, LightPoint, LightVertex, RadianceEstimator, SurfaceHit};
+use lucerna_core::math::Vec2;
 use lucerna_core::sampling::Stream;
 use lucerna_core::scene::{EmitterId, Failed, Param, Properties, Scene};
 use std::sync::Arc;
@@ -89,8 +90,8 @@ pub fn pair_before_single(stream: &mut Stream<'_>) -> (f32, Vec2) {
 /// Where a path was last scattered into a density: what a light found by chance is weighted against.
 #[derive(Clone, Copy)]
 pub struct Scattered {
-    /// The point.
-    pub p: Vec3,
+    /// The vertex.
+    pub from: LightVertex,
     /// Density of the direction taken, per solid angle.
     pub pdf: f32,
 }
@@ -111,10 +112,12 @@ pub fn emission(scene: &Scene, ray: &Ray, hit: Option<&SurfaceHit>) -> Option<(E
     (!radiance.is_black()).then_some((id, radiance))
 }
 
-/// As [`emission`], weighted by `heuristic` against emitter sampling if the path was scattered into a density before.
+/// As [`emission`], weighted by `heuristic` against the sampling of lights if the path was scattered into a density
+/// before.
 #[inline]
 pub fn weighted_emission(
     scene: &Scene,
+    lights: &impl PickLights,
     ray: &Ray,
     hit: Option<&SurfaceHit>,
     last: Option<Scattered>,
@@ -125,10 +128,10 @@ pub fn weighted_emission(
         None => radiance,
         Some(last) => {
             let point = match hit {
-                Some(hit) => LightPoint::of_hit(last.p, hit, ray.d),
+                Some(hit) => LightPoint::of_hit(last.from.p, hit, ray.d),
                 None => LightPoint::of_environment(ray.d),
             };
-            radiance * heuristic(last.pdf, scene.pdf_emitter(id, last.p, &point))
+            radiance * heuristic(last.pdf, lights.pdf(scene, id, &last.from, &point))
         }
     }
 }
@@ -159,22 +162,50 @@ fn find_surface_without_light(scene: &Scene, ray: &Ray, hit: &mut SurfaceHit, ra
 }
 
 /// An integrator inside another one.
-pub struct Nested {
+pub struct Nested<'a> {
     /// The name it was given.
     pub name: String,
     /// Its own extra channels.
     pub aovs: Vec<String>,
-    integrator: Arc<dyn Integrator>,
+    inner: Inner<'a>,
 }
 
-impl Nested {
+/// What is inside: the integrator, or its estimator as it was made ready for a scene.
+enum Inner<'a> {
+    Integrator(Arc<dyn Integrator>),
+    Same(&'a dyn RadianceEstimator),
+    Prepared(Box<dyn RadianceEstimator + 'a>),
+}
+
+impl Nested<'_> {
     /// All nested integrators in file order; one that is no forward estimator is an error.
-    pub fn all(p: &Properties<'_>) -> Result<Vec<Nested>, Failed> {
+    pub fn all(p: &Properties<'_>) -> Result<Vec<Nested<'static>>, Failed> {
         let nest = |(name, integrator): (&str, Arc<dyn Integrator>)| match integrator.estimator() {
-            Some(_) => Ok(Nested { name: name.to_owned(), aovs: integrator.aov_names(), integrator }),
+            Some(_) => {
+                let (name, aovs) = (name.to_owned(), integrator.aov_names());
+                Ok(Nested { name, aovs, inner: Inner::Integrator(integrator) })
+            }
             None => Err(p.error(name, format!("integrator \"{name}\" cannot be nested"))),
         };
         p.integrators().into_iter().map(nest).collect()
+    }
+
+    /// All of them ready for a scene; `None` where nothing has to be made.
+    pub fn prepare<'b>(nested: &'b [Nested<'_>], scene: &Scene) -> Option<Vec<Nested<'b>>> {
+        let mut any = false;
+        let ready = nested.iter().filter_map(|n| {
+            let estimator = n.estimator()?;
+            let inner = match estimator.prepare(scene) {
+                Some(prepared) => {
+                    any = true;
+                    Inner::Prepared(prepared)
+                }
+                None => Inner::Same(estimator),
+            };
+            Some(Nested { name: n.name.clone(), aovs: n.aovs.clone(), inner })
+        });
+        let ready = ready.collect();
+        any.then_some(ready)
     }
 
     /// Its own extra channels as the outer integrator names them.
@@ -184,11 +215,15 @@ impl Nested {
 
     /// The estimator; always there for what [`all`](Self::all) gave.
     pub fn estimator(&self) -> Option<&dyn RadianceEstimator> {
-        self.integrator.estimator()
+        match &self.inner {
+            Inner::Integrator(integrator) => integrator.estimator(),
+            Inner::Same(estimator) => Some(*estimator),
+            Inner::Prepared(estimator) => Some(&**estimator),
+        }
     }
 
     /// Whether any of them reads ray differentials.
-    pub fn want_differentials(nested: &[Nested]) -> bool {
+    pub fn want_differentials(nested: &[Nested<'_>]) -> bool {
         nested.iter().any(|n| n.estimator().is_some_and(RadianceEstimator::wants_differentials))
     }
 }

@@ -9,6 +9,7 @@
 //! | `emitter_samples` | integer | `shading_samples` | emitter samples per pixel sample |
 //! | `bsdf_samples` | integer | `shading_samples` | BSDF samples per pixel sample; not both 0 |
 //! | `hide_emitters` | boolean | false | lights are not seen directly |
+//! | nested `light_sampler` | | by the scene's weights | which light a sample is taken of |
 //!
 //! ```xml
 //! <integrator type="direct">
@@ -20,9 +21,10 @@
 use super::common::{
     COMMON, HIDE, emission, find_surface, forward_integrator, mis_weight, pair_before_single, timeout,
 };
+use super::lights::{ByScene, LIGHTS, Lights, PickLights};
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{
-    Arena, CameraRay, Integrator, LightPoint, Lobes, Radiance, RadianceEstimator, SurfaceHit, Transport,
+    Arena, CameraRay, Integrator, LightPoint, LightSample, Lobes, Radiance, RadianceEstimator, SurfaceHit, Transport,
 };
 use lucerna_core::sampling::Stream;
 use lucerna_core::scene::{Built, Constructor, Param, Plugin, Properties, Scene};
@@ -37,6 +39,7 @@ pub const PLUGIN: Plugin = Plugin {
         COMMON,
         &[
             HIDE,
+            LIGHTS,
             Param::int("shading_samples", 1, "sets both counts below").range(1.0, MOST),
             Param::int_opt("emitter_samples", "emitter samples per pixel sample").range(0.0, MOST),
             Param::int_opt("bsdf_samples", "BSDF samples per pixel sample").range(0.0, MOST),
@@ -57,10 +60,17 @@ fn build(p: &Properties<'_>) -> Built<dyn Integrator> {
     if emitter_samples + bsdf_samples == 0 {
         return Err(p.error("bsdf_samples", "\"emitter_samples\" and \"bsdf_samples\" cannot both be 0"));
     }
-    Ok(Arc::new(Direct { emitter_samples, bsdf_samples, hide_emitters: p.bool("hide_emitters"), timeout: timeout(p) }))
+    Ok(Arc::new(Direct {
+        emitter_samples,
+        bsdf_samples,
+        hide_emitters: p.bool("hide_emitters"),
+        lights: Lights::new(p),
+        timeout: timeout(p),
+    }))
 }
 
 struct Direct {
+    lights: Lights,
     timeout: Option<f64>,
     emitter_samples: u32,
     bsdf_samples: u32,
@@ -70,6 +80,11 @@ struct Direct {
 forward_integrator!(Direct);
 
 impl RadianceEstimator for Direct {
+    fn prepare(&self, scene: &Scene) -> Option<Box<dyn RadianceEstimator + '_>> {
+        let lights = self.lights.prepare(scene)?;
+        Some(Box::new(Direct { lights, ..*self }))
+    }
+
     fn radiance(
         &self,
         scene: &Scene,
@@ -77,6 +92,23 @@ impl RadianceEstimator for Direct {
         stream: &mut Stream<'_>,
         arena: &mut Arena,
         _aovs: &mut [f32],
+    ) -> Radiance {
+        match self.lights.ready() {
+            None => self.trace(scene, &ByScene, camera, stream, arena),
+            Some(lights) => self.trace(scene, &lights, camera, stream, arena),
+        }
+    }
+}
+
+impl Direct {
+    /// A camera path whose lights are picked by `lights`.
+    fn trace(
+        &self,
+        scene: &Scene,
+        lights: &impl PickLights,
+        camera: &CameraRay,
+        stream: &mut Stream<'_>,
+        arena: &mut Arena,
     ) -> Radiance {
         let ray = &camera.ray;
         let mut found = Radiance::default();
@@ -95,21 +127,29 @@ impl RadianceEstimator for Direct {
         let bsdf = scene.bsdf(&hit);
         let bxdf = bsdf.resolve(&hit, arena);
 
-        if bsdf.lobes().is_smooth() {
-            for _ in 0..self.emitter_samples {
-                let Some((_, light)) = scene.sample_emitter(hit.p, stream.next_2d()) else { continue };
-                let wo = hit.to_local(light.point.d);
-                let (value, pdf) = bxdf.eval_pdf(hit.wi, wo, Transport::Radiance);
-                let contribution = value * light.weight;
-                if contribution.is_black() || !scene.keeps_sides(&hit, wo) {
-                    continue;
-                }
-                found.rays += 1;
-                if scene.visible(&hit, &light) {
-                    let weight =
-                        if light.delta { 1.0 } else { mis_weight(light.pdf * emitter_count, pdf * bsdf_count) };
-                    found.rgb += contribution * (weight / emitter_count);
-                }
+        let lobes = bsdf.lobes();
+        let from = lights.vertex(&hit, lobes);
+        let unblocked = |light: &LightSample| {
+            let wo = hit.to_local(light.point.d);
+            let (value, pdf) = bxdf.eval_pdf(hit.wi, wo, Transport::Radiance);
+            let contribution = value * light.weight;
+            if contribution.is_black() || !scene.keeps_sides(&hit, wo) {
+                return Rgb::BLACK;
+            }
+            let weight = if light.delta { 1.0 } else { mis_weight(light.pdf * emitter_count, pdf * bsdf_count) };
+            contribution * (weight / emitter_count)
+        };
+        let count = if lobes.is_smooth() { self.emitter_samples } else { 0 };
+        for _ in 0..count {
+            let worth = |light: &LightSample| unblocked(light).luminance();
+            let Some(light) = lights.sample(scene, &from, stream, worth) else { continue };
+            let contribution = unblocked(&light);
+            if contribution.is_black() {
+                continue;
+            }
+            found.rays += 1;
+            if scene.visible(&hit, &light) {
+                found.rgb += contribution;
             }
         }
 
@@ -129,7 +169,7 @@ impl RadianceEstimator for Direct {
                     Some(light_hit) => LightPoint::of_hit(hit.p, light_hit, d),
                     None => LightPoint::of_environment(d),
                 };
-                mis_weight(sample.pdf * bsdf_count, scene.pdf_emitter(id, hit.p, &point) * emitter_count)
+                mis_weight(sample.pdf * bsdf_count, lights.pdf(scene, id, &from, &point) * emitter_count)
             };
             found.rgb += Rgb::splat(weight / bsdf_count) * radiance * sample.weight;
         }

@@ -4,6 +4,7 @@ mod aov;
 mod common;
 mod depth;
 mod direct;
+mod lights;
 mod moment;
 mod path;
 mod volpath;

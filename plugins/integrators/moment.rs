@@ -27,22 +27,27 @@ pub const PLUGIN: Plugin = Plugin {
 
 fn build(p: &Properties<'_>) -> Built<dyn Integrator> {
     let nested = Nested::all(p)?;
-    let colour = |n: &Nested| ["X", "Y", "Z"].map(|c| format!("{}.{c}", n.name));
+    let colour = |n: &Nested<'_>| ["X", "Y", "Z"].map(|c| format!("{}.{c}", n.name));
     let mut names: Vec<String> = nested.iter().flat_map(|n| n.aov_names().chain(colour(n))).collect();
     let squares: Vec<String> = names.iter().map(|n| format!("m2_{n}")).collect();
     names.extend(squares);
     Ok(Arc::new(Moment { nested, names, timeout: timeout(p) }))
 }
 
-struct Moment {
-    nested: Vec<Nested>,
+struct Moment<'a> {
+    nested: Vec<Nested<'a>>,
     names: Vec<String>,
     timeout: Option<f64>,
 }
 
-forward_integrator!(Moment, |this| this.names.clone());
+forward_integrator!(Moment<'static>, |this| this.names.clone());
 
-impl RadianceEstimator for Moment {
+impl RadianceEstimator for Moment<'_> {
+    fn prepare(&self, scene: &Scene) -> Option<Box<dyn RadianceEstimator + '_>> {
+        let nested = Nested::prepare(&self.nested, scene)?;
+        Some(Box::new(Moment { nested, names: self.names.clone(), timeout: self.timeout }))
+    }
+
     fn wants_differentials(&self) -> bool {
         Nested::want_differentials(&self.nested)
     }

@@ -10,6 +10,7 @@
 //! | `max_depth` | integer | -1 | longest path: 0 black, 1 lights only, 2 direct light, -1 no limit |
 //! | `rr_depth` | integer | 5 | depth from which Russian roulette may end a path, at least 1 |
 //! | `hide_emitters` | boolean | false | lights are not seen directly; the light they give is unchanged |
+//! | nested `light_sampler` | | by the scene's weights | which light a vertex samples |
 //!
 //! ```xml
 //! <integrator type="path">
@@ -21,6 +22,7 @@ use super::common::{
     COMMON, PATH, PathLimits, Scattered, find_surface, forward_integrator, mis_weight, survival, timeout,
     weighted_emission,
 };
+use super::lights::{ByScene, LIGHTS, Lights, PickLights};
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{
     Arena, Bxdf, CameraRay, Integrator, LightSample, Lobes, Radiance, RadianceEstimator, SurfaceHit, Transport,
@@ -34,22 +36,28 @@ pub const PLUGIN: Plugin = Plugin {
     name: "path",
     aliases: &[],
     summary: "path tracing with emitter sampling and multiple importance sampling",
-    params: &[COMMON, PATH],
+    params: &[COMMON, PATH, &[LIGHTS]],
     build: Constructor::Integrator(build),
 };
 
 fn build(p: &Properties<'_>) -> Built<dyn Integrator> {
-    Ok(Arc::new(Path { limits: PathLimits::new(p), timeout: timeout(p) }))
+    Ok(Arc::new(Path { limits: PathLimits::new(p), lights: Lights::new(p), timeout: timeout(p) }))
 }
 
 struct Path {
     limits: PathLimits,
+    lights: Lights,
     timeout: Option<f64>,
 }
 
 forward_integrator!(Path);
 
 impl RadianceEstimator for Path {
+    fn prepare(&self, scene: &Scene) -> Option<Box<dyn RadianceEstimator + '_>> {
+        let lights = self.lights.prepare(scene)?;
+        Some(Box::new(Path { lights, ..*self }))
+    }
+
     fn radiance(
         &self,
         scene: &Scene,
@@ -57,6 +65,23 @@ impl RadianceEstimator for Path {
         stream: &mut Stream<'_>,
         arena: &mut Arena,
         _aovs: &mut [f32],
+    ) -> Radiance {
+        match self.lights.ready() {
+            None => self.trace(scene, &ByScene, camera, stream, arena),
+            Some(lights) => self.trace(scene, &lights, camera, stream, arena),
+        }
+    }
+}
+
+impl Path {
+    /// A camera path whose lights are picked by `lights`.
+    fn trace(
+        &self,
+        scene: &Scene,
+        lights: &impl PickLights,
+        camera: &CameraRay,
+        stream: &mut Stream<'_>,
+        arena: &mut Arena,
     ) -> Radiance {
         let PathLimits { max_depth, rr_depth, hide_emitters } = self.limits;
         let mut found = Radiance::default();
@@ -76,7 +101,7 @@ impl RadianceEstimator for Path {
             let hidden = hide_emitters && depth == 0;
             let met = find_surface(scene, &ray, hidden, &mut hit, &mut found.rays);
             if !hidden {
-                found.rgb += throughput * weighted_emission(scene, &ray, met.then_some(&hit), last, mis_weight);
+                found.rgb += throughput * weighted_emission(scene, lights, &ray, met.then_some(&hit), last, mis_weight);
             }
             if !met {
                 break;
@@ -89,8 +114,14 @@ impl RadianceEstimator for Path {
             }
             let bsdf = scene.bsdf(&hit);
             let bxdf = bsdf.resolve(&hit, arena);
-            if bsdf.lobes().is_smooth()
-                && let Some((_, light)) = scene.sample_emitter(hit.p, stream.next_2d())
+            let lobes = bsdf.lobes();
+            let from = lights.vertex(&hit, lobes);
+            let worth = |light: &LightSample| {
+                let (contribution, pdf) = scattered(scene, &hit, bxdf, light);
+                (contribution * weight_of(light, pdf)).luminance()
+            };
+            if lobes.is_smooth()
+                && let Some(light) = lights.sample(scene, &from, stream, worth)
             {
                 found.rgb += throughput * direct_light(scene, &hit, bxdf, &light, &mut found.rays);
             }
@@ -109,7 +140,7 @@ impl RadianceEstimator for Path {
             }
             let d = hit.to_world(sample.wo);
             ray = hit.leave(d);
-            last = (!sample.lobe.has_delta()).then_some(Scattered { p: hit.p, pdf: sample.pdf });
+            last = (!sample.lobe.has_delta()).then_some(Scattered { from, pdf: sample.pdf });
             depth += 1;
 
             if throughput.is_black() {
@@ -133,15 +164,31 @@ impl RadianceEstimator for Path {
 /// Light of one emitter sample scattered at a hit, weighted against BSDF sampling.
 #[inline]
 fn direct_light(scene: &Scene, hit: &SurfaceHit, bxdf: &dyn Bxdf, light: &LightSample, rays: &mut u32) -> Rgb {
-    let wo = hit.to_local(light.point.d);
-    let (value, pdf) = bxdf.eval_pdf(hit.wi, wo, Transport::Radiance);
-    let contribution = value * light.weight;
-    if contribution.is_black() || !scene.keeps_sides(hit, wo) {
+    let (contribution, pdf) = scattered(scene, hit, bxdf, light);
+    if contribution.is_black() {
         return Rgb::BLACK;
     }
     *rays += 1;
     if !scene.visible(hit, light) {
         return Rgb::BLACK;
     }
-    contribution * if light.delta { 1.0 } else { mis_weight(light.pdf, pdf) }
+    contribution * weight_of(light, pdf)
+}
+
+/// The same without the weight and as if nothing stood between, and the density of BSDF sampling.
+#[inline]
+fn scattered(scene: &Scene, hit: &SurfaceHit, bxdf: &dyn Bxdf, light: &LightSample) -> (Rgb, f32) {
+    let wo = hit.to_local(light.point.d);
+    let (value, pdf) = bxdf.eval_pdf(hit.wi, wo, Transport::Radiance);
+    let contribution = value * light.weight;
+    if contribution.is_black() || !scene.keeps_sides(hit, wo) {
+        return (Rgb::BLACK, pdf);
+    }
+    (contribution, pdf)
+}
+
+/// Weight of emitter sampling against BSDF sampling with density `pdf`.
+#[inline]
+fn weight_of(light: &LightSample, pdf: f32) -> f32 {
+    if light.delta { 1.0 } else { mis_weight(light.pdf, pdf) }
 }

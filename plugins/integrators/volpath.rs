@@ -10,6 +10,7 @@
 //! | `max_depth` | integer | -1 | longest path: 0 black, 1 lights only, 2 direct light, -1 no limit |
 //! | `rr_depth` | integer | 5 | depth beyond which Russian roulette may end a path |
 //! | `hide_emitters` | boolean | false | lights are not seen directly |
+//! | nested `light_sampler` | | by the scene's weights | which light a vertex samples |
 //!
 //! ```xml
 //! <integrator type="volpath">
@@ -21,6 +22,7 @@ use super::common::{
     COMMON, PATH, PathLimits, Scattered, balance_weight, find_surface, forward_integrator, mis_weight,
     pair_before_single, survival, timeout, weighted_emission,
 };
+use super::lights::{ByScene, LIGHTS, Lights, PickLights};
 use lucerna_core::accel::Ray;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{
@@ -35,7 +37,7 @@ pub const PLUGIN: Plugin = Plugin {
     name: "volpath",
     aliases: &[],
     summary: "path tracing that looks through index-matched surfaces",
-    params: &[COMMON, PATH],
+    params: &[COMMON, PATH, &[LIGHTS]],
     build: Constructor::Integrator(build),
 };
 
@@ -68,19 +70,25 @@ impl Variant {
 /// The estimator, shared with `volpathmis`.
 pub(super) struct VolPath {
     limits: PathLimits,
+    lights: Lights,
     timeout: Option<f64>,
     variant: Variant,
 }
 
 impl VolPath {
     pub(super) fn new(p: &Properties<'_>, variant: Variant) -> Self {
-        VolPath { limits: PathLimits::new(p), timeout: timeout(p), variant }
+        VolPath { limits: PathLimits::new(p), lights: Lights::new(p), timeout: timeout(p), variant }
     }
 }
 
 forward_integrator!(VolPath);
 
 impl RadianceEstimator for VolPath {
+    fn prepare(&self, scene: &Scene) -> Option<Box<dyn RadianceEstimator + '_>> {
+        let lights = self.lights.prepare(scene)?;
+        Some(Box::new(VolPath { lights, ..*self }))
+    }
+
     fn radiance(
         &self,
         scene: &Scene,
@@ -88,6 +96,23 @@ impl RadianceEstimator for VolPath {
         stream: &mut Stream<'_>,
         arena: &mut Arena,
         _aovs: &mut [f32],
+    ) -> Radiance {
+        match self.lights.ready() {
+            None => self.trace(scene, &ByScene, camera, stream, arena),
+            Some(lights) => self.trace(scene, &lights, camera, stream, arena),
+        }
+    }
+}
+
+impl VolPath {
+    /// A camera path whose lights are picked by `lights`.
+    fn trace(
+        &self,
+        scene: &Scene,
+        lights: &impl PickLights,
+        camera: &CameraRay,
+        stream: &mut Stream<'_>,
+        arena: &mut Arena,
     ) -> Radiance {
         let PathLimits { max_depth, rr_depth, hide_emitters } = self.limits;
         let mut found = Radiance::default();
@@ -122,25 +147,33 @@ impl RadianceEstimator for VolPath {
             let met = find_surface(scene, &ray, hidden, &mut hit, &mut found.rays);
             if !hidden {
                 found.rgb += throughput
-                    * weighted_emission(scene, &ray, met.then_some(&hit), last, |a, b| self.variant.weight(a, b));
+                    * weighted_emission(scene, lights, &ray, met.then_some(&hit), last, |a, b| {
+                        self.variant.weight(a, b)
+                    });
             }
             if !met {
                 break;
             }
             let bsdf = scene.bsdf(&hit);
             let bxdf = bsdf.resolve(&hit, arena);
-            if depth + 1 < max_depth
-                && bsdf.lobes().is_smooth()
-                && let Some((_, light)) = scene.sample_emitter(hit.p, stream.next_2d())
-            {
+            let lobes = bsdf.lobes();
+            let from = lights.vertex(&hit, lobes);
+            let unblocked = |light: &LightSample| {
                 let wo = hit.to_local(light.point.d);
                 let (value, pdf) = bxdf.eval_pdf(hit.wi, wo, Transport::Radiance);
-                let mut contribution = value * light.weight;
-                if !contribution.is_black() && scene.keeps_sides(&hit, wo) {
-                    contribution *= transmittance(scene, &hit, &light, &mut found.rays);
-                    found.rgb +=
-                        throughput * contribution * if light.delta { 1.0 } else { self.variant.weight(light.pdf, pdf) };
-                }
+                let contribution = value * light.weight;
+                let counts = !contribution.is_black() && scene.keeps_sides(&hit, wo);
+                counts.then(|| (contribution, if light.delta { 1.0 } else { self.variant.weight(light.pdf, pdf) }))
+            };
+            let worth =
+                |light: &LightSample| unblocked(light).map_or(0.0, |(value, weight)| (value * weight).luminance());
+            if depth + 1 < max_depth
+                && lobes.is_smooth()
+                && let Some(light) = lights.sample(scene, &from, stream, worth)
+                && let Some((mut contribution, weight)) = unblocked(&light)
+            {
+                contribution *= transmittance(scene, &hit, &light, &mut found.rays);
+                found.rgb += throughput * contribution * weight;
             }
             let (u1, u2) = pair_before_single(stream);
             let sample = bxdf.sample(hit.wi, u1, u2, Transport::Radiance);
@@ -160,7 +193,7 @@ impl RadianceEstimator for VolPath {
             } else {
                 depth += 1;
                 found.alpha = 1.0;
-                last = (!sample.lobe.has_delta()).then_some(Scattered { p: hit.p, pdf: sample.pdf });
+                last = (!sample.lobe.has_delta()).then_some(Scattered { from, pdf: sample.pdf });
             }
         }
         found

@@ -6,6 +6,7 @@
 //! | parameter | type | default | meaning |
 //! |---|---|---|---|
 //! | `max_depth`, `rr_depth`, `hide_emitters` | | -1, 5, false | as `volpath` |
+//! | nested `light_sampler` | | by the scene's weights | which light a vertex samples |
 //! | `use_spectral_mis` | anything | | accepted, without effect as long as there are no media |
 //!
 //! ```xml
@@ -15,6 +16,7 @@
 //! ```
 
 use super::common::{COMMON, PATH};
+use super::lights::LIGHTS;
 use super::volpath::{Variant, VolPath};
 use lucerna_core::interfaces::Integrator;
 use lucerna_core::scene::{Built, Constructor, Param, Plugin, Properties};
@@ -25,7 +27,7 @@ pub const PLUGIN: Plugin = Plugin {
     name: "volpathmis",
     aliases: &[],
     summary: "as volpath, with spectral multiple importance sampling inside media",
-    params: &[COMMON, PATH, &[Param::ignored("use_spectral_mis", "of no effect without media")]],
+    params: &[COMMON, PATH, &[LIGHTS, Param::ignored("use_spectral_mis", "of no effect without media")]],
     build: Constructor::Integrator(build),
 };
 

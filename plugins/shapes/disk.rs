@@ -18,7 +18,7 @@ use super::plane::Plane;
 use super::{COMMON, ORIENTED, enclose};
 use lucerna_core::accel::{Geometry, Hit, NO_TRIANGLE, PrimHit, Primitive, Ray};
 use lucerna_core::interfaces::{AreaSample, Shape, SurfaceHit};
-use lucerna_core::math::{Aabb, Frame, Vec2};
+use lucerna_core::math::{Aabb, Frame, Vec2, Vec3};
 use lucerna_core::sampling::warp;
 use lucerna_core::scene::{Built, Constructor, Plugin, Properties};
 use std::f32::consts::{PI, TAU};
@@ -110,6 +110,10 @@ impl Shape for Disk {
             pdf: 1.0 / self.area(),
             triangle: NO_TRIANGLE,
         })
+    }
+
+    fn normal_cone(&self) -> (Vec3, f32) {
+        (self.0.n, 0.0)
     }
 
     fn at_uv(&self, uv: Vec2) -> Option<SurfaceHit> {

@@ -170,6 +170,15 @@ impl Mesh {
         }
     }
 
+    /// A point uniform on a triangle, with the geometric normal, which the density per solid angle needs; the reference
+    /// takes the interpolated one. The density is the caller's.
+    fn point_on(&self, triangle: u32, u2: Vec2) -> AreaSample {
+        let corner = self.corner(triangle, warp::square_to_triangle(u2));
+        let (p, p_error) = corner.point();
+        let n = if self.flip_normals { -corner.normal() } else { corner.normal() };
+        AreaSample { p, p_error, n, uv: self.uv(&corner), pdf: 0.0, triangle }
+    }
+
     fn choice(&self) -> Option<&Discrete> {
         let areas = || {
             let corners = |t: &[u32; 3]| t.map(|i| self.positions[i as usize]);
@@ -209,13 +218,15 @@ impl Shape for Mesh {
         *into = self.hit_on(hit.t, hit.prim, Vec2::new(hit.u, hit.v));
     }
 
-    /// With the geometric normal, which the density per solid angle needs; the reference takes the interpolated one.
     fn sample_area(&self, u2: Vec2) -> Option<AreaSample> {
         let (triangle, rest) = self.choice()?.sample_reuse(u2.y);
-        let corner = self.corner(triangle, warp::square_to_triangle(Vec2::new(u2.x, rest)));
-        let (p, p_error) = corner.point();
-        let n = if self.flip_normals { -corner.normal() } else { corner.normal() };
-        Some(AreaSample { p, p_error, n, uv: self.uv(&corner), pdf: 1.0 / self.area, triangle })
+        Some(AreaSample { pdf: 1.0 / self.area, ..self.point_on(triangle, Vec2::new(u2.x, rest)) })
+    }
+
+    fn sample_triangle(&self, triangle: u32, u2: Vec2) -> Option<AreaSample> {
+        let corners = self.triangles.get(triangle as usize)?.map(|i| self.positions[i as usize]);
+        let pdf = 2.0 / area_normal(corners).length() as f32;
+        pdf.is_finite().then(|| AreaSample { pdf, ..self.point_on(triangle, u2) })
     }
 
     fn at_uv(&self, uv: Vec2) -> Option<SurfaceHit> {

@@ -90,6 +90,10 @@ impl Shape for Rectangle {
         Some(AreaSample { p, p_error: self.plane.error, n: self.plane.n, uv: u2, pdf: 1.0 / self.area, triangle })
     }
 
+    fn normal_cone(&self) -> (Vec3, f32) {
+        (self.plane.n, 0.0)
+    }
+
     fn at_uv(&self, uv: Vec2) -> Option<SurfaceHit> {
         let within = uv.cmpge(Vec2::ZERO).all() && uv.cmple(Vec2::ONE).all();
         within.then(|| SurfaceHit { triangle: u32::from(uv.x + uv.y > 1.0), ..self.hit_at(0.0, uv) })

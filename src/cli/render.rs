@@ -56,6 +56,10 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME")]
     sampler: Option<String>,
 
+    /// Another way for its integrators to choose lights, as NAME or NAME:parameter=value,…
+    #[arg(long, value_name = "NAME")]
+    light_sampler: Option<String>,
+
     /// Render a part only: x,y,width,height in pixels
     #[arg(long, value_name = "X,Y,W,H", value_parser = numbers::<4>)]
     crop: Option<[u32; 4]>,
@@ -131,6 +135,10 @@ pub fn run(registry: &Registry, arguments: &Arguments) -> Result<ExitCode, Failu
     let mut description = arguments.scene.describe()?;
     if let Some(text) = &arguments.integrator {
         replace_child(&mut description, ObjectKind::Integrator, text)?;
+    }
+    if let Some(text) = &arguments.light_sampler {
+        let node = short_form::parse(ObjectKind::LightSampler, text, "--light-sampler").map_err(Failure::new)?;
+        short_form::decide(&mut description, registry, &node).map_err(Failure::new)?;
     }
     if let Some(size) = arguments.size {
         description.resize_films(size, "--size");

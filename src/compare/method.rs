@@ -1,6 +1,6 @@
 //! A method: a name and what it changes in a scene. Whatever it does not name stays as the scene has it.
 
-use crate::short_form::{parse, plain_value};
+use crate::short_form::{decide, parse, plain_value};
 use lucerna_core::scene::{Description, Location, Node, ObjectKind, Parameter, Registry, Value};
 use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -17,6 +17,8 @@ pub struct Method {
     pub integrator: Option<Node>,
     /// Another sampler.
     pub sampler: Option<Node>,
+    /// Another way for its integrators to choose lights.
+    pub light_sampler: Option<Node>,
     /// Values for the scene's `$name`.
     pub defines: Vec<(String, String)>,
 }
@@ -46,6 +48,7 @@ struct Entry {
     renderer: Option<String>,
     integrator: Option<String>,
     sampler: Option<String>,
+    light_sampler: Option<String>,
     #[serde(default)]
     parameters: BTreeMap<String, toml::Value>,
     #[serde(default)]
@@ -91,7 +94,7 @@ fn located(content: &str, error: &toml::de::Error) -> String {
 }
 
 impl Method {
-    /// Of a short form: `path`, `path:max_depth=4,sampler=sobol`, `scene`, `mitsuba:llvm_ad_rgb:path`.
+    /// Of a short form: `path`, `path:max_depth=4,sampler=sobol,light_sampler=power`, `scene`, `mitsuba:llvm_ad_rgb:path`.
     ///
     /// # Errors
     /// If it is none.
@@ -104,22 +107,24 @@ impl Method {
             None => (None, text),
         };
         let mut node = parse(ObjectKind::Integrator, rest, "--methods")?;
-        let sampler = match node.take("sampler").map(|p| p.value) {
-            Some(Value::String(name)) => Some(parse(ObjectKind::Sampler, &name, "--methods")?),
-            Some(_) => return Err(format!("--methods {text}: sampler must be the name of one")),
-            None => None,
+        let mut plugin_of = |kind: ObjectKind| match node.take(kind.tag()).map(|p| p.value) {
+            Some(Value::String(name)) => Ok(Some(parse(kind, &name, "--methods")?)),
+            Some(_) => Err(format!("--methods {text}: {} must be the name of one", kind.tag())),
+            None => Ok(None),
         };
-        let names = variant.iter().chain([&node.plugin]).chain(sampler.iter().map(|s| &s.plugin));
+        let (sampler, light_sampler) = (plugin_of(ObjectKind::Sampler)?, plugin_of(ObjectKind::LightSampler)?);
+        let decisions = sampler.iter().chain(&light_sampler).map(|node| &node.plugin);
+        let names = variant.iter().chain([&node.plugin]).chain(decisions);
         if !names.into_iter().all(|name| is_name(name)) {
             return Err(format!(
                 "--methods {text}: expected scene, INTEGRATOR, INTEGRATOR:parameter=value,sampler=NAME, mitsuba:VARIANT:INTEGRATOR, or a .toml file"
             ));
         }
         if node.plugin == "scene" && !node.parameters.is_empty() {
-            return Err(format!("--methods {text}: \"scene\" takes no parameters but sampler"));
+            return Err(format!("--methods {text}: \"scene\" takes no parameters but sampler and light_sampler"));
         }
         let integrator = (node.plugin != "scene").then_some(node);
-        Ok(Method { name: text.to_owned(), variant, integrator, sampler, defines: Vec::new() })
+        Ok(Method { name: text.to_owned(), variant, integrator, sampler, light_sampler, defines: Vec::new() })
     }
 
     fn of_entry(entry: Entry) -> Result<Self, String> {
@@ -130,6 +135,9 @@ impl Method {
         let mut method = Method::of_text(&text)?;
         if let Some(sampler) = entry.sampler {
             method.sampler = Some(parse(ObjectKind::Sampler, &sampler, "sampler")?);
+        }
+        if let Some(light_sampler) = entry.light_sampler {
+            method.light_sampler = Some(parse(ObjectKind::LightSampler, &light_sampler, "light_sampler")?);
         }
         if !entry.parameters.is_empty() {
             let node = method.integrator.as_mut().ok_or("parameters need an integrator")?;
@@ -157,13 +165,17 @@ impl Method {
         let mut parts = vec![self.variant.as_ref().map_or("Lucerna".to_owned(), |v| format!("mitsuba {v}"))];
         parts.push(self.integrator.as_ref().map_or("the scene's integrator".to_owned(), short));
         parts.extend(self.sampler.as_ref().map(|s| format!("sampler {}", short(s))));
+        parts.extend(self.light_sampler.as_ref().map(|s| format!("light sampler {}", short(s))));
         parts.extend(self.defines.iter().map(|(name, value)| format!("${name} = {value}")));
         parts.join(", ")
     }
 
     /// Changes a scene. The integrator's parameters that the scene gives stay, if the method does not give them and they
     /// have a meaning for its integrator; the number of samples per pixel belongs to the comparison.
-    pub fn apply(&self, description: &mut Description, registry: &Registry) {
+    ///
+    /// # Errors
+    /// If the scene has no integrator that makes a decision of the method; one line.
+    pub fn apply(&self, description: &mut Description, registry: &Registry) -> Result<(), String> {
         let root = description.root;
         if let Some(wanted) = &self.integrator {
             replace(description, root, wanted, registry);
@@ -176,6 +188,7 @@ impl Method {
                 replace(description, sensor, wanted, registry);
             }
         }
+        self.light_sampler.as_ref().map_or(Ok(()), |wanted| decide(description, registry, wanted))
     }
 }
 
@@ -249,7 +262,7 @@ mod tests {
         for (text, depth) in [("path", Some(6)), ("path:max_depth=3", Some(3)), ("volpath", Some(6)), ("direct", None)]
         {
             let mut scene = lucerna_core::scene::xml::load_str(xml, "t.xml", &Default::default()).unwrap();
-            Method::of_text(text).unwrap().apply(&mut scene, &crate::builtin());
+            Method::of_text(text).unwrap().apply(&mut scene, &crate::builtin()).unwrap();
             let integrators = scene.children(scene.root).map(|(_, id)| scene.node(id));
             let all: Vec<&Node> = integrators.filter(|node| node.kind == ObjectKind::Integrator).collect();
             assert_eq!(all.len(), 1);

@@ -43,7 +43,7 @@ impl Subject {
         }
         let Source { mut description, files } = read(path, &reading).map_err(|e| one_line(&e))?;
         let content = scene_hash(path, &files)?;
-        method.apply(&mut description, registry);
+        method.apply(&mut description, registry)?;
         if let Some(size) = options.size {
             description.resize_films(size, "--size");
         }
@@ -51,7 +51,7 @@ impl Subject {
         let text = to_xml(&description, &WriteOptions { for_reference, folder: None });
         let peer = match &method.variant {
             Some(variant) => {
-                for node in method.integrator.iter().chain(&method.sampler) {
+                for node in method.integrator.iter().chain(&method.sampler).chain(&method.light_sampler) {
                     if !text.contains(&format!("type=\"{}\"", node.plugin)) {
                         return Err(format!("the reference has no {} \"{}\"", node.kind.tag(), node.plugin));
                     }

@@ -7,6 +7,7 @@
 
 mod bsdfs;
 mod emitters;
+mod light_samplers;
 mod rfilters;
 mod samplers;
 mod shapes;
@@ -18,13 +19,14 @@ use lucerna::core::scene::ObjectKind;
 /// Sensors, films and integrators have no density of their own to test: they are under test in `plugins` beside their
 /// code, and whole pictures in `tests/analytic.rs` and `tests/references.rs`.
 const ELSEWHERE: [ObjectKind; 3] = [ObjectKind::Sensor, ObjectKind::Film, ObjectKind::Integrator];
-const HERE: [ObjectKind; 6] = [
+const HERE: [ObjectKind; 7] = [
     ObjectKind::Bsdf,
     ObjectKind::Emitter,
     ObjectKind::Shape,
     ObjectKind::Texture,
     ObjectKind::Rfilter,
     ObjectKind::Sampler,
+    ObjectKind::LightSampler,
 ];
 
 #[test]

@@ -1,6 +1,6 @@
 //! What the properties of all kinds share: objects from XML, random numbers, statistics.
 
-use lucerna::core::interfaces::{Bsdf, Emitter, Rfilter, Sampler, Texture};
+use lucerna::core::interfaces::{Bsdf, Emitter, LightSampler, Rfilter, Sampler, Texture};
 use lucerna::core::math::Vec2;
 use lucerna::core::sampling::Pcg32;
 use lucerna::core::scene::xml::{LoadOptions, load_str};
@@ -68,6 +68,7 @@ typed!(texture, Texture, Arc<dyn Texture>);
 typed!(built_shape, Shape, BuiltShape);
 typed!(rfilter, Rfilter, Arc<dyn Rfilter>);
 typed!(sampler, Sampler, Arc<dyn Sampler>);
+typed!(light_sampler, LightSampler, Arc<dyn LightSampler>);
 typed!(emitter, Emitter, Arc<dyn Emitter>);
 
 /// Two random numbers.

@@ -3,7 +3,7 @@
 use super::SurfaceHit;
 use crate::accel::NO_TRIANGLE;
 use crate::color::Rgb;
-use crate::math::{Vec2, Vec3};
+use crate::math::{Aabb, Vec2, Vec3};
 use std::ops::BitOr;
 
 /// What an emitter is like.
@@ -79,6 +79,22 @@ pub struct LightSample {
     pub delta: bool,
 }
 
+/// Where the light of an emitter, or of a part of it, starts and goes: what a choice among many lights is made by (Conty
+/// Estevez and Kulla 2018, "Importance sampling of many lights with adaptive tree splitting", section 4.1).
+#[derive(Clone, Copy, Debug)]
+pub struct LightBounds {
+    /// The box around it.
+    pub bounds: Aabb,
+    /// Unit middle of the cone of its normals.
+    pub axis: Vec3,
+    /// Half opening angle of the cone of normals: 0 for a flat light, π if they point everywhere.
+    pub theta_o: f32,
+    /// Angle to the normal beyond which no light goes: π/2 for a surface.
+    pub theta_e: f32,
+    /// Luminous intensity in the direction of most of it, in W·sr⁻¹, about.
+    pub intensity: f32,
+}
+
 /// A light source. Reference points are in world space.
 pub trait Emitter: Send + Sync {
     /// What it is like.
@@ -94,6 +110,26 @@ pub trait Emitter: Send + Sync {
 
     /// Density with which [`sample_direct`](Self::sample_direct) gives this point; 0 for a delta light.
     fn pdf_direct(&self, from: Vec3, point: &LightPoint) -> f32;
+
+    /// Number of parts that can be sampled apart: triangles, numbered as in its shape.
+    fn part_count(&self) -> u32 {
+        1
+    }
+
+    /// Where the light of a part starts and goes. `None` if it comes from infinitely far, or nobody knows.
+    fn part_bounds(&self, _part: u32) -> Option<LightBounds> {
+        None
+    }
+
+    /// As [`sample_direct`](Self::sample_direct), of one part.
+    fn sample_part(&self, _part: u32, from: Vec3, u2: Vec2) -> Option<LightSample> {
+        self.sample_direct(from, u2)
+    }
+
+    /// Density with which [`sample_part`](Self::sample_part) gives this point, which is on the part.
+    fn pdf_part(&self, _part: u32, from: Vec3, point: &LightPoint) -> f32 {
+        self.pdf_direct(from, point)
+    }
 
     /// Radiance that leaves a hit on the emitter's shape along `hit.wi`.
     fn radiance(&self, _hit: &SurfaceHit) -> Rgb {

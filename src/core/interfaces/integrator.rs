@@ -46,6 +46,12 @@ pub trait RadianceEstimator: Send + Sync {
         false
     }
 
+    /// The estimator with what it has to make for a scene before the first sample; `None` where that is nothing. Whoever
+    /// renders asks first, and takes the samples from what it is given.
+    fn prepare(&self, _scene: &Scene) -> Option<Box<dyn RadianceEstimator + '_>> {
+        None
+    }
+
     /// Unbiased estimate of the radiance along `camera.ray`, its weight left out. `aovs` has as many entries as
     /// [`Integrator::aov_names`] and is zero on entry.
     fn radiance(

@@ -4,6 +4,7 @@ use super::{LightPoint, SurfaceHit};
 use crate::accel::{Geometry, Hit, Instance, Ray};
 use crate::math::{Aabb, Vec2, Vec3};
 use crate::scene::ShapeGroup;
+use std::f32::consts::PI;
 use std::sync::Arc;
 
 /// A point sampled on a surface.
@@ -60,6 +61,18 @@ pub trait Shape: Send + Sync {
 
     /// A point uniform in area; `pdf` per unit area.
     fn sample_area(&self, u2: Vec2) -> Option<AreaSample>;
+
+    /// A point uniform in area on one triangle; `pdf` per unit area of it. `None` if the triangle has no area, and on what
+    /// is no mesh.
+    fn sample_triangle(&self, _triangle: u32, _u2: Vec2) -> Option<AreaSample> {
+        None
+    }
+
+    /// A cone around the normals of all that [`sample_area`](Self::sample_area) gives: unit axis, and half the opening
+    /// angle in radians. All directions unless the shape knows better.
+    fn normal_cone(&self) -> (Vec3, f32) {
+        (Vec3::Z, PI)
+    }
 
     /// A point as a light for `from`, with its density per solid angle there. By area unless the shape knows better.
     fn sample_direct(&self, from: Vec3, u2: Vec2) -> Option<(LightPoint, Vec3, f32)> {

@@ -23,6 +23,8 @@ const ENDLESS: u32 = 1 << 24;
 
 /// Renders an estimator into the context's film until the budget is spent.
 pub fn render_estimator(cx: &mut RenderContext<'_>, estimator: &dyn RadianceEstimator) -> Result<Report, RenderError> {
+    let prepared = estimator.prepare(cx.scene);
+    let estimator = prepared.as_deref().unwrap_or(estimator);
     let asked = match cx.budget {
         Budget::Samples(spp) => cx.sampler.round_spp(spp),
         Budget::Seconds(_) => ENDLESS,
@@ -40,6 +42,8 @@ pub fn render_estimator(cx: &mut RenderContext<'_>, estimator: &dyn RadianceEsti
 
 /// The value of one pixel sample, with the very numbers it has in a full run. `pixel` belongs to the full film.
 pub fn replay(cx: &RenderContext<'_>, estimator: &dyn RadianceEstimator, pixel: UVec2, sample: u32) -> Radiance {
+    let prepared = estimator.prepare(cx.scene);
+    let estimator = prepared.as_deref().unwrap_or(estimator);
     let spp = match cx.budget {
         Budget::Samples(spp) => cx.sampler.round_spp(spp),
         Budget::Seconds(_) => ENDLESS,

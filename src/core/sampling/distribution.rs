@@ -73,10 +73,17 @@ impl Discrete {
     /// The index a number in [0, 1) falls on; never one of weight zero.
     #[inline]
     pub fn sample(&self, u: f32) -> u32 {
-        let target = f64::from(u) * self.sum();
+        self.sample_long(f64::from(u))
+    }
+
+    /// As [`sample`](Self::sample), for a number with more bits than single precision has: of use where there are so many
+    /// entries that some would get few of 2²⁴ numbers.
+    #[inline]
+    pub fn sample_long(&self, u: f64) -> u32 {
+        let target = u * self.sum();
         // Exact, since the number of parts is a power of two: the entry is where a search over all would find it.
         let parts = self.guide.len() - 1;
-        let part = ((f64::from(u) * parts as f64) as usize).min(parts - 1);
+        let part = ((u * parts as f64) as usize).min(parts - 1);
         let [begin, end] = [self.guide[part], self.guide[part + 1]].map(|i| i as usize);
         let index = begin + self.cdf[begin..end].partition_point(|&c| c <= target);
         (index as u32).clamp(self.first, self.last)

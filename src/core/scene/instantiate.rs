@@ -262,6 +262,7 @@ impl<'a> Builder<'a> {
             Constructor::Sampler(f) => f(&properties).map(Object::Sampler),
             Constructor::Emitter(f) => f(&properties).map(Object::Emitter),
             Constructor::Bsdf(f) => f(&properties).map(Object::Bsdf),
+            Constructor::LightSampler(f) => f(&properties).map(Object::LightSampler),
             Constructor::Texture(f) => f(&properties).map(Object::Texture),
             Constructor::Sensor(f) => {
                 f(&properties).and_then(|sensor| match (properties.film(), properties.sampler()) {

@@ -13,6 +13,7 @@ mod clamped;
 pub mod description;
 pub mod error;
 mod instantiate;
+mod lights;
 mod notes;
 pub mod object;
 pub mod param;

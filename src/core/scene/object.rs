@@ -1,6 +1,6 @@
 //! A built object of any kind.
 
-use crate::interfaces::{Bsdf, Emitter, Film, Integrator, Rfilter, Sampler, Sensor, Shape, Texture};
+use crate::interfaces::{Bsdf, Emitter, Film, Integrator, LightSampler, Rfilter, Sampler, Sensor, Shape, Texture};
 use std::sync::Arc;
 
 /// A shape with what the scene hangs on it.
@@ -36,6 +36,7 @@ pub enum Object {
     Sampler(Arc<dyn Sampler>),
     Emitter(Arc<dyn Emitter>),
     Shape(BuiltShape),
+    LightSampler(Arc<dyn LightSampler>),
     Bsdf(Arc<dyn Bsdf>),
     Texture(Arc<dyn Texture>),
 }

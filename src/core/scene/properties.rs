@@ -12,7 +12,9 @@ use super::object::{BuiltShape, Object};
 use super::param::{Default, Param, ParamType, Slot};
 use super::registry::{Failed, Plugin};
 use crate::color::{Rgb, ior, spectrum};
-use crate::interfaces::{Bsdf, ColorSource, Film, Integrator, Rfilter, Sampler, ScalarSource, Shape, Texture};
+use crate::interfaces::{
+    Bsdf, ColorSource, Film, Integrator, LightSampler, Rfilter, Sampler, ScalarSource, Shape, Texture,
+};
 use crate::math::{Transform, Vec3};
 use glam::DMat4;
 use std::cell::{Cell, RefCell};
@@ -389,6 +391,11 @@ impl<'a> Properties<'a> {
     /// The nested sampler.
     pub fn sampler(&self) -> Option<Arc<dyn Sampler>> {
         self.of_kind(|o| if let Object::Sampler(x) = o { Some(x.clone()) } else { None }).pop()
+    }
+
+    /// The nested decision which light to sample.
+    pub fn light_sampler(&self) -> Option<Arc<dyn LightSampler>> {
+        self.of_kind(|o| if let Object::LightSampler(x) = o { Some(x.clone()) } else { None }).pop()
     }
 
     /// The shape an emitter sits on.

@@ -6,7 +6,7 @@
 use super::description::ObjectKind;
 use super::param::Param;
 use super::properties::Properties;
-use crate::interfaces::{Bsdf, Emitter, Film, Integrator, Rfilter, Sampler, Sensor, Shape, Texture};
+use crate::interfaces::{Bsdf, Emitter, Film, Integrator, LightSampler, Rfilter, Sampler, Sensor, Shape, Texture};
 use std::sync::Arc;
 
 /// Returned by a constructor that could not go on. What was wrong has been told to [`Properties`].
@@ -28,6 +28,7 @@ pub enum Constructor {
     Emitter(fn(&Properties<'_>) -> Built<dyn Emitter>),
     Shape(fn(&Properties<'_>) -> Built<dyn Shape>),
     Bsdf(fn(&Properties<'_>) -> Built<dyn Bsdf>),
+    LightSampler(fn(&Properties<'_>) -> Built<dyn LightSampler>),
     Texture(fn(&Properties<'_>) -> Built<dyn Texture>),
 }
 
@@ -43,6 +44,7 @@ impl Constructor {
             Constructor::Emitter(_) => ObjectKind::Emitter,
             Constructor::Shape(_) => ObjectKind::Shape,
             Constructor::Bsdf(_) => ObjectKind::Bsdf,
+            Constructor::LightSampler(_) => ObjectKind::LightSampler,
             Constructor::Texture(_) => ObjectKind::Texture,
         }
     }

@@ -81,7 +81,7 @@ pub struct Scene {
     shapes: Vec<BuiltShape>,
     emitters: Vec<Arc<dyn Emitter>>,
     /// For each emitter, the number of its shape's first triangle for [`Ray::ends`].
-    first_triangles: Vec<u32>,
+    pub(super) first_triangles: Vec<u32>,
     /// For each shape its emitter, or [`NO_EMITTER`].
     emitter_of_shape: Vec<u32>,
     environment: Option<EmitterId>,
