@@ -15,6 +15,7 @@ pub mod check;
 mod cli;
 pub mod compare;
 mod short_form;
+pub mod view;
 
 pub use lucerna_core as core;
 pub use lucerna_plugins as plugins;
