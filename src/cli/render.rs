@@ -254,9 +254,6 @@ fn render(
     let seen = views.finish(&report, &cx.store, &cx.film);
     write(arguments, name, &cx, &report, output)?;
     let line = summary(arguments, &cx, &report, &seen, output)?;
-    if arguments.views.serve_keep && !control.is_stopped() {
-        eprintln!("the page stays until Ctrl-C");
-    }
     views.close(&line, arguments.views.serve_keep, &|| control.is_stopped());
     let bad = report.bad.count > 0 && arguments.strict_nan;
     Ok(if bad { ExitCode::from(BAD_SAMPLES) } else { ExitCode::SUCCESS })

@@ -155,6 +155,11 @@ impl Page {
             (state.fraction, state.is_known) = (1.0, true);
             state.number
         };
+        // Whoever ended the run by Ctrl-C does not wait for a second one.
+        let keep = keep && !is_over();
+        if keep {
+            eprintln!("the page stays at {} until Ctrl-C", self.url);
+        }
         let started = Instant::now();
         loop {
             let is_watched = self.shared.state().is_watched();

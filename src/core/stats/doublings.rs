@@ -19,8 +19,8 @@
 //! nothing that paths do.
 //!
 //! The sums go over pixels and channels, each value divided by r² + ε as in relMSE ([`super::metrics`]). For r, which is not
-//! known, stands the mean so far, but no more than the brightest of the eight neighbours has: without that, a firefly
-//! divides its own error. What stays out is light that no path has found yet. How far the estimate goes is measured by
+//! known, stands the mean so far, but no more than that of the four brightest of the eight neighbours: without that, a
+//! firefly divides its own error. All eight would call small lights fireflies, the brightest alone believes too much. What stays out is light that no path has found yet. How far the estimate goes is measured by
 //! `tests/live.rs` and told in the README.
 //!
 //! Between doublings, n is the sum of powers of two, and the samples one after the other are blocks of so many. As if
@@ -118,27 +118,15 @@ impl Doublings {
 }
 
 /// Mean over the finite values of (a − b)² / (r² + ε), with and without the largest ones; r is b, but no more than the
-/// brightest of the eight neighbours.
+/// brighter half of its neighbours.
 fn relative_changes(a: &[f32], b: &[f32], width: usize) -> [f64; 2] {
-    let row = width * CHANNELS;
-    let height = b.len() / row;
     let mut changes = Vec::with_capacity(b.len());
     for (i, (a, x)) in a.iter().zip(b).enumerate() {
-        if !(a.is_finite() && x.is_finite()) {
-            continue;
+        if a.is_finite() && x.is_finite() {
+            let (a, x) = (f64::from(*a), f64::from(*x));
+            let r = x.min(brighter_neighbours(b, width, i));
+            changes.push((a - x).powi(2) / (r * r + EPSILON));
         }
-        let (column, line) = (i % row / CHANNELS, i / row);
-        let mut brightest = f32::NEG_INFINITY;
-        for y in line.saturating_sub(1)..(line + 2).min(height) {
-            for x in column.saturating_sub(1)..(column + 2).min(width) {
-                if (x, y) != (column, line) {
-                    brightest = brightest.max(b[y * row + x * CHANNELS + i % CHANNELS]);
-                }
-            }
-        }
-        // A picture of one pixel has no neighbours.
-        let r = if brightest.is_finite() { f64::from(x.min(brightest)) } else { f64::from(*x) };
-        changes.push((f64::from(*a) - f64::from(*x)).powi(2) / (r * r + EPSILON));
     }
     let kept = changes.len() - (TRIMMED * changes.len() as f64).ceil() as usize;
     if kept == 0 {
@@ -147,6 +135,26 @@ fn relative_changes(a: &[f32], b: &[f32], width: usize) -> [f64; 2] {
     let all = changes.iter().sum::<f64>() / changes.len() as f64;
     changes.sort_unstable_by(f64::total_cmp);
     [all, changes[..kept].iter().sum::<f64>() / kept as f64]
+}
+
+/// Mean of the brighter half of the neighbours of a value, in its channel; infinite for a picture of a single pixel.
+fn brighter_neighbours(picture: &[f32], width: usize, at: usize) -> f64 {
+    let row = width * CHANNELS;
+    let (line, column, height) = (at / row, at % row / CHANNELS, picture.len() / row);
+    let (mut found, mut count) = ([f32::NEG_INFINITY; 8], 0);
+    for y in line.saturating_sub(1)..(line + 2).min(height) {
+        for x in column.saturating_sub(1)..(column + 2).min(width) {
+            if (x, y) != (column, line) {
+                found[count] = picture[y * row + x * CHANNELS + at % CHANNELS];
+                count += 1;
+            }
+        }
+    }
+    let neighbours = &mut found[..count];
+    neighbours.sort_unstable_by(f32::total_cmp);
+    let brighter = &neighbours[count / 2..];
+    let sum: f64 = brighter.iter().map(|v| f64::from(*v)).sum();
+    if sum.is_finite() && !brighter.is_empty() { sum / brighter.len() as f64 } else { f64::INFINITY }
 }
 
 #[cfg(test)]
@@ -205,7 +213,7 @@ mod tests {
         let noise = |pcg: &mut Pcg32, n: u32| {
             let mut levels = levels.borrow_mut();
             for (k, level) in levels.iter_mut().enumerate() {
-                if n % (2 << k) == 0 {
+                if n.is_multiple_of(2 << k) {
                     *level = uniform(pcg);
                 }
             }
