@@ -16,6 +16,7 @@ mod cli;
 pub mod compare;
 mod pictures;
 mod short_form;
+pub mod view;
 
 pub use lucerna_core as core;
 pub use lucerna_plugins as plugins;

@@ -5,9 +5,9 @@ mod compare;
 mod convert;
 mod info;
 mod plugins;
-mod progress;
 mod render;
 mod scene_args;
+mod views;
 
 use crate::short_form::key_value;
 use clap::{Parser, Subcommand};

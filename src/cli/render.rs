@@ -1,19 +1,19 @@
 //! `lucerna render`: a scene to a picture.
 
 use super::Failure;
-use super::progress::Bar;
 use super::scene_args::{SceneArguments, default_output};
+use super::views::{MOST_SPP, Rendered, ViewArguments};
 use crate::short_form;
+use crate::view::{Summary, Views, peak_memory};
 use clap::Args;
 use lucerna_core::image::{self, exr, png};
 use lucerna_core::interfaces::{ComponentFormat, FileFormat, Integrator};
 use lucerna_core::math::UVec2;
-use lucerna_core::render::{Budget, Control, FilmStore, RenderContext, Report, SampleOrder, replay};
+use lucerna_core::render::{Budget, Control, FilmStore, OnPass, PassEnd, RenderContext, Report, SampleOrder, replay};
 use lucerna_core::scene::{BuiltSensor, Description, Object, ObjectKind, Parameter, Registry, Scene, Value, build_one};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::OnceLock;
 
 /// Exit code of a run that met bad samples under `--strict-nan`.
 const BAD_SAMPLES: u8 = 3;
@@ -83,6 +83,9 @@ pub struct Arguments {
     /// Refuse to start if the picture needs more memory than so many MiB
     #[arg(long, value_name = "MIB", default_value_t = 16384)]
     max_memory: u64,
+
+    #[command(flatten)]
+    views: ViewArguments,
 
     /// Write a summary in JSON
     #[arg(long, value_name = "FILE")]
@@ -155,6 +158,7 @@ pub fn run(registry: &Registry, arguments: &Arguments) -> Result<ExitCode, Failu
     let integrator = scene.integrator().ok_or_else(|| Failure::new("the scene has no integrator"))?.clone();
     let budget = match (arguments.seconds, arguments.spp) {
         (Some(seconds), _) => Budget::Seconds(seconds),
+        (None, None) if arguments.views.target_relmse.is_some() => Budget::Samples(camera.sampler.round_spp(MOST_SPP)),
         (None, spp) => Budget::Samples(camera.sampler.round_spp(spp.unwrap_or(camera.sampler.sample_count()))),
     };
     tell_rounding(arguments, budget);
@@ -170,11 +174,12 @@ fn tell_rounding(arguments: &Arguments, budget: Budget) {
 }
 
 /// What the run takes, before it starts.
-fn tell_size(size: UVec2, budget: Budget, bytes: u64) {
+fn tell_size(size: UVec2, budget: Budget, target: Option<f64>, bytes: u64) {
     let work = match budget {
         Budget::Samples(spp) => format!("{spp} samples each"),
         Budget::Seconds(seconds) => format!("{seconds} s"),
     };
+    let work = target.map_or(work.clone(), |target| format!("at most {work}, until the relMSE is about {target:e}"));
     let mib = bytes as f64 / f64::from(1 << 20);
     eprintln!("{} x {} pixels, {work}; the sums of the picture take {mib:.1} MiB", size.x, size.y);
 }
@@ -216,25 +221,6 @@ fn render(
     budget: Budget,
     output: &Path,
 ) -> Result<ExitCode, Failure> {
-    // The handler of Ctrl-C and the progress bar live as long as the program.
-    static BAR: OnceLock<Bar> = OnceLock::new();
-    static CONTROL: OnceLock<Control<'static>> = OnceLock::new();
-    let bar = BAR.get_or_init(|| Bar::new(arguments.quiet));
-    let control = CONTROL.get_or_init(|| {
-        let started = std::time::Instant::now();
-        let show: &'static (dyn Fn(_) + Sync) =
-            Box::leak(Box::new(move |progress| bar.show(progress, started.elapsed().as_secs_f64())));
-        let control = Control::new().with_progress(show);
-        match budget {
-            Budget::Seconds(seconds) => control.with_deadline(seconds),
-            Budget::Samples(_) => match integrator.timeout() {
-                Some(seconds) => control.with_deadline(seconds),
-                None => control,
-            },
-        }
-    });
-    stop_on_interrupt(control);
-
     let window = window(arguments, camera)?;
     let needed = FilmStore::bytes(window.1, integrator.aov_names().len()) >> 20;
     if needed > arguments.max_memory {
@@ -243,12 +229,27 @@ fn render(
         return Err(Failure::new(format!("{message} (raise it with --max-memory, or render a part with --crop)")));
     }
     if !arguments.quiet && arguments.pixel.is_none() {
-        tell_size(window.1, budget, FilmStore::bytes(window.1, integrator.aov_names().len()));
+        tell_size(
+            window.1,
+            budget,
+            arguments.views.target_relmse,
+            FilmStore::bytes(window.1, integrator.aov_names().len()),
+        );
         let flat = scene.accel().stats().degenerate;
         if flat > 0 {
             eprintln!("note: {flat} primitives have no area and are left out");
         }
     }
+    let views: &'static Views = Box::leak(Box::new(arguments.views.open(&Rendered {
+        scene: arguments.scene.name(),
+        integrator: name,
+        sampler: &*camera.sampler,
+        film: camera.film.settings().size,
+        window,
+        output,
+        quiet: arguments.quiet,
+    })?));
+    let control = control(views, integrator, budget);
     let mut cx =
         RenderContext::of_window(scene, camera, window, budget, arguments.seed, control, integrator.aov_names());
     if let Some(threads) = arguments.reference_order {
@@ -258,11 +259,32 @@ fn render(
         return replay_pixel(&cx, integrator, UVec2::new(x, y), arguments.sample);
     }
     let report = integrator.render(&mut cx).map_err(Failure::new)?;
-    bar.finish();
+    let seen = views.finish(&report, &cx.store, &cx.film);
     write(arguments, name, &cx, &report, output)?;
-    summary(arguments, &cx, &report, output)?;
+    let line = summary(arguments, &cx, &report, &seen, output)?;
+    views.close(&line, arguments.views.serve_keep, &|| control.is_stopped());
     let bad = report.bad.count > 0 && arguments.strict_nan;
     Ok(if bad { ExitCode::from(BAD_SAMPLES) } else { ExitCode::SUCCESS })
+}
+
+/// Stop button, deadline, and who is told. As Ctrl-C can come at any time, it lives as long as the program.
+fn control(views: &'static Views, integrator: &dyn Integrator, budget: Budget) -> &'static Control<'static> {
+    let show: &'static (dyn Fn(_) + Sync) = Box::leak(Box::new(|progress| views.progress(progress)));
+    let look: OnPass<'static> = Box::leak(Box::new(|end: PassEnd<'_>| views.pass_end(end)));
+    let mut control = Control::new().with_progress(show);
+    if views.watches_passes() {
+        control = control.with_pass_end(look);
+    }
+    let seconds = match budget {
+        Budget::Seconds(seconds) => Some(seconds),
+        Budget::Samples(_) => integrator.timeout(),
+    };
+    if let Some(seconds) = seconds {
+        control = control.with_deadline(seconds);
+    }
+    let control: &'static Control<'static> = Box::leak(Box::new(control));
+    stop_on_interrupt(control);
+    control
 }
 
 /// Offset and size of the part to render: that of `--crop`, or of the film.
@@ -339,36 +361,35 @@ fn exr_options(arguments: &Arguments, integrator: &str, cx: &RenderContext<'_>, 
     }
 }
 
-fn summary(arguments: &Arguments, cx: &RenderContext<'_>, report: &Report, output: &Path) -> Result<(), Failure> {
+/// Tells how it ended, in the line that it gives and in the JSON file.
+fn summary(
+    arguments: &Arguments,
+    cx: &RenderContext<'_>,
+    report: &Report,
+    seen: &Summary,
+    output: &Path,
+) -> Result<String, Failure> {
+    tell_bad_samples(report, arguments.seed);
+    if let Some(warning) = seen.warning() {
+        eprintln!("{warning}");
+    }
     let seconds = report.seconds.max(1e-9);
     let (rate, ray_rate) = (report.samples as f64 / seconds / 1e6, report.rays as f64 / seconds / 1e6);
-    if report.bad.count > 0 {
-        let share = report.bad.count as f64 / report.samples as f64;
-        eprintln!(
-            "warning: {} samples ({share:.1e} of all) were NaN, infinite or negative and left out",
-            report.bad.count
-        );
-        for bad in &report.bad.first {
-            let (x, y) = (bad.pixel.x, bad.pixel.y);
-            eprintln!(
-                "warning:   {:?}; repeat with --pixel {x},{y} --sample {} --seed {}",
-                bad.value, bad.sample, arguments.seed
-            );
-        }
-    }
+    let stopped = if seen.is_stopped(report) { ", stopped early" } else { "" };
+    let line = format!(
+        "{}: {} x {} pixels, {} spp{stopped}{}, {seconds:.2} s, {rate:.2} Msamples/s, {ray_rate:.2} Mrays/s{}",
+        output.display(),
+        cx.store.size().x,
+        cx.store.size().y,
+        report.spp,
+        seen.tell_estimate(),
+        peak_memory().map_or_else(String::new, |mib| format!(", {mib} MiB"))
+    );
     if !arguments.quiet {
-        let stopped = if report.stopped { ", stopped early" } else { "" };
-        eprintln!(
-            "{}: {} x {} pixels, {} spp{stopped}, {seconds:.2} s, {rate:.2} Msamples/s, {ray_rate:.2} Mrays/s{}",
-            output.display(),
-            cx.store.size().x,
-            cx.store.size().y,
-            report.spp,
-            peak_memory().map_or_else(String::new, |mib| format!(", {mib} MiB"))
-        );
+        eprintln!("{line}");
     }
     if let Some(path) = &arguments.stats_json {
-        let stats = json!({
+        let mut stats = json!({
             "version": env!("CARGO_PKG_VERSION"),
             "spp": report.spp,
             "samples": report.samples,
@@ -377,19 +398,25 @@ fn summary(arguments: &Arguments, cx: &RenderContext<'_>, report: &Report, outpu
             "msamples_per_second": rate,
             "mrays_per_second": ray_rate,
             "bad_samples": report.bad.count,
-            "stopped": report.stopped,
+            "stopped": seen.is_stopped(report),
             "peak_memory_mib": peak_memory(),
         });
+        seen.add_to(&mut stats);
         std::fs::write(path, format!("{stats:#}\n")).map_err(|e| Failure::new(format!("{}: {e}", path.display())))?;
     }
-    Ok(())
+    Ok(line)
 }
 
-/// Largest resident size of the process so far in MiB, where the system tells.
-fn peak_memory() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
-    line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib >> 10)
+fn tell_bad_samples(report: &Report, seed: u32) {
+    if report.bad.count == 0 {
+        return;
+    }
+    let share = report.bad.count as f64 / report.samples as f64;
+    eprintln!("warning: {} samples ({share:.1e} of all) were NaN, infinite or negative and left out", report.bad.count);
+    for bad in &report.bad.first {
+        let (x, y) = (bad.pixel.x, bad.pixel.y);
+        eprintln!("warning:   {:?}; repeat with --pixel {x},{y} --sample {} --seed {seed}", bad.value, bad.sample);
+    }
 }
 
 /// Puts an object from the command line in the place of the scene's own.

@@ -2,6 +2,7 @@
 
 pub mod agreement;
 pub mod chi2;
+pub mod doublings;
 pub mod figures;
 pub mod images;
 mod measured;

@@ -32,6 +32,11 @@ impl Bar {
         self.0.set_message(format!("{} spp, {rate:.2} Msamples/s", progress.spp));
     }
 
+    /// Prints a line on standard error, above the bar if there is one.
+    pub fn print(&self, line: &str) {
+        self.0.suspend(|| eprintln!("{line}"));
+    }
+
     /// Takes the bar off the screen.
     pub fn finish(&self) {
         self.0.finish_and_clear();
