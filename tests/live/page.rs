@@ -64,6 +64,7 @@ fn the_page_shows_a_render_as_it_forms() {
     let facts = browser.eval("document.querySelector('#facts').innerText");
     let facts = facts.as_str().expect("text");
     assert!(facts.contains("million samples/s") && facts.contains("Estimated relMSE"), "{facts}");
+    browser.screenshot(&folder.join("early.png"));
     let early = browser.eval("document.querySelector('#canvas').toDataURL()");
     browser.wait("document.documentElement.dataset.over === 'true'");
     let (code, stderr) = served.finish();
