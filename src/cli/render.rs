@@ -4,14 +4,13 @@ use super::Failure;
 use super::scene_args::{SceneArguments, default_output};
 use super::views::{MOST_SPP, Rendered, ViewArguments};
 use crate::short_form;
-use crate::view::{Summary, Views, peak_memory};
+use crate::view::{self, Summary, Views};
 use clap::Args;
 use lucerna_core::image::{self, exr, png};
 use lucerna_core::interfaces::{ComponentFormat, FileFormat, Integrator};
 use lucerna_core::math::UVec2;
 use lucerna_core::render::{Budget, Control, FilmStore, OnPass, PassEnd, RenderContext, Report, SampleOrder, replay};
 use lucerna_core::scene::{BuiltSensor, Description, Object, ObjectKind, Parameter, Registry, Scene, Value, build_one};
-use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -369,54 +368,19 @@ fn summary(
     seen: &Summary,
     output: &Path,
 ) -> Result<String, Failure> {
-    tell_bad_samples(report, arguments.seed);
+    view::tell_bad_samples(report, arguments.seed);
     if let Some(warning) = seen.warning() {
         eprintln!("{warning}");
     }
-    let seconds = report.seconds.max(1e-9);
-    let (rate, ray_rate) = (report.samples as f64 / seconds / 1e6, report.rays as f64 / seconds / 1e6);
-    let stopped = if seen.is_stopped(report) { ", stopped early" } else { "" };
-    let line = format!(
-        "{}: {} x {} pixels, {} spp{stopped}{}, {seconds:.2} s, {rate:.2} Msamples/s, {ray_rate:.2} Mrays/s{}",
-        output.display(),
-        cx.store.size().x,
-        cx.store.size().y,
-        report.spp,
-        seen.tell_estimate(),
-        peak_memory().map_or_else(String::new, |mib| format!(", {mib} MiB"))
-    );
+    let line = format!("{}: {}", output.display(), seen.tell(report, cx.store.size()));
     if !arguments.quiet {
         eprintln!("{line}");
     }
     if let Some(path) = &arguments.stats_json {
-        let mut stats = json!({
-            "version": env!("CARGO_PKG_VERSION"),
-            "spp": report.spp,
-            "samples": report.samples,
-            "rays": report.rays,
-            "render_seconds": report.seconds,
-            "msamples_per_second": rate,
-            "mrays_per_second": ray_rate,
-            "bad_samples": report.bad.count,
-            "stopped": seen.is_stopped(report),
-            "peak_memory_mib": peak_memory(),
-        });
-        seen.add_to(&mut stats);
+        let stats = seen.document(report);
         std::fs::write(path, format!("{stats:#}\n")).map_err(|e| Failure::new(format!("{}: {e}", path.display())))?;
     }
     Ok(line)
-}
-
-fn tell_bad_samples(report: &Report, seed: u32) {
-    if report.bad.count == 0 {
-        return;
-    }
-    let share = report.bad.count as f64 / report.samples as f64;
-    eprintln!("warning: {} samples ({share:.1e} of all) were NaN, infinite or negative and left out", report.bad.count);
-    for bad in &report.bad.first {
-        let (x, y) = (bad.pixel.x, bad.pixel.y);
-        eprintln!("warning:   {:?}; repeat with --pixel {x},{y} --sample {} --seed {seed}", bad.value, bad.sample);
-    }
 }
 
 /// Puts an object from the command line in the place of the scene's own.

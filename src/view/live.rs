@@ -13,7 +13,7 @@ use super::Point;
 use super::http::{self, Answer};
 use lucerna_core::render::Progress;
 use serde_json::{Value, json};
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -30,7 +30,7 @@ const SHARE: u32 = 20;
 const LOOKING: Duration = Duration::from_secs(3);
 
 /// How long the end waits for those who look.
-const FAREWELL: Duration = Duration::from_secs(3);
+const FAREWELL: Duration = Duration::from_secs(5);
 
 /// What does not change in the course of a run.
 pub struct Facts {
@@ -59,6 +59,8 @@ struct Shared {
     state: Mutex<State>,
     /// Number of the picture that was sent last.
     taken: AtomicU32,
+    /// Whether the end was told.
+    told: AtomicBool,
 }
 
 #[derive(Default)]
@@ -93,7 +95,8 @@ impl Page {
     /// # Errors
     /// If the port cannot be had.
     pub fn serve(port: u16, facts: Facts) -> Result<Self, String> {
-        let shared = Arc::new(Shared { facts, state: Mutex::default(), taken: AtomicU32::new(0) });
+        let shared =
+            Arc::new(Shared { facts, state: Mutex::default(), taken: AtomicU32::new(0), told: AtomicBool::new(false) });
         let answering = shared.clone();
         let address = http::serve(port, Arc::new(move |path: &str| answering.answer(path)))
             .map_err(|e| format!("port {port} of 127.0.0.1: {e}"))?;
@@ -164,7 +167,9 @@ impl Page {
         loop {
             let is_watched = self.shared.state().is_watched();
             let is_taken = self.shared.taken.load(Ordering::Acquire) == last;
-            let may_go = !is_watched || is_taken || started.elapsed() > FAREWELL;
+            // The last picture may be taken before the end is known.
+            let is_told = self.shared.told.load(Ordering::Acquire);
+            let may_go = !is_watched || (is_taken && is_told) || started.elapsed() > FAREWELL;
             if if keep { is_over() } else { may_go } {
                 break;
             }
@@ -183,7 +188,15 @@ impl Shared {
             "/" => ("text/html; charset=utf-8", include_bytes!("page/index.html").as_slice().into()),
             "/style.css" => ("text/css; charset=utf-8", include_bytes!("page/style.css").as_slice().into()),
             "/live.js" => ("text/javascript; charset=utf-8", include_bytes!("page/live.js").as_slice().into()),
-            "/state" => ("application/json", self.tell().to_string().into_bytes().into()),
+            "/state" => {
+                let state = self.tell();
+                let (shared, is_over) = (self.clone(), !state["ended"].is_null());
+                let on_sent = move || {
+                    shared.told.fetch_or(is_over, Ordering::AcqRel);
+                };
+                let body = state.to_string().into_bytes().into();
+                return Some(Answer { kind: "application/json", body, on_sent: Some(Box::new(on_sent)) });
+            }
             "/picture" => {
                 let (number, bytes) = {
                     let state = self.state();

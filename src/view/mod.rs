@@ -16,7 +16,7 @@ pub mod tev;
 pub use bar::Bar;
 pub use live::{Facts, Page};
 pub use reference::Reference;
-pub use summary::{Summary, peak_memory};
+pub use summary::{Summary, tell_bad_samples};
 
 use lucerna_core::image::Image;
 use lucerna_core::interfaces::FilmSettings;

@@ -1,6 +1,7 @@
 //! What is told of a render when it is over.
 
 use super::Point;
+use lucerna_core::math::UVec2;
 use lucerna_core::render::Report;
 use serde_json::{Value, json};
 
@@ -23,9 +24,16 @@ impl Summary {
         report.stopped && !self.reached
     }
 
-    /// The estimate, for the line that tells the end.
-    pub fn tell_estimate(&self) -> String {
-        self.estimate.map_or_else(String::new, |estimate| format!(", estimated relMSE {estimate:.2e}"))
+    /// How a run ended, in a line.
+    pub fn tell(&self, report: &Report, size: UVec2) -> String {
+        let [rate, ray_rate] = rates(report);
+        let stopped = if self.is_stopped(report) { ", stopped early" } else { "" };
+        let estimate = self.estimate.map_or_else(String::new, |estimate| format!(", estimated relMSE {estimate:.2e}"));
+        let memory = peak_memory().map_or_else(String::new, |mib| format!(", {mib} MiB"));
+        format!(
+            "{} x {} pixels, {} spp{stopped}{estimate}, {:.2} s, {rate:.2} Msamples/s, {ray_rate:.2} Mrays/s{memory}",
+            size.x, size.y, report.spp, report.seconds
+        )
     }
 
     /// Why the target was not met, if it was not.
@@ -38,8 +46,21 @@ impl Summary {
         Some(format!("warning: a relMSE of {target:e} was not reached: {why}"))
     }
 
-    /// Adds what was seen to a document.
-    pub fn add_to(&self, document: &mut Value) {
+    /// The same for programs.
+    pub fn document(&self, report: &Report) -> Value {
+        let [rate, ray_rate] = rates(report);
+        let mut document = json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "spp": report.spp,
+            "samples": report.samples,
+            "rays": report.rays,
+            "render_seconds": report.seconds,
+            "msamples_per_second": rate,
+            "mrays_per_second": ray_rate,
+            "bad_samples": report.bad.count,
+            "stopped": self.is_stopped(report),
+            "peak_memory_mib": peak_memory(),
+        });
         if let Some(estimate) = self.estimate {
             document["estimated_rel_mse"] = json!(estimate);
         }
@@ -50,6 +71,7 @@ impl Summary {
         if !self.points.is_empty() {
             document["errors"] = self.points.iter().map(point).collect();
         }
+        document
     }
 }
 
@@ -65,8 +87,27 @@ fn point(point: &Point) -> Value {
     })
 }
 
+/// Millions of samples and of rays a second.
+fn rates(report: &Report) -> [f64; 2] {
+    let seconds = report.seconds.max(1e-9);
+    [report.samples, report.rays].map(|count| count as f64 / seconds / 1e6)
+}
+
+/// Tells of samples that were left out, if there were any.
+pub fn tell_bad_samples(report: &Report, seed: u32) {
+    if report.bad.count == 0 {
+        return;
+    }
+    let share = report.bad.count as f64 / report.samples as f64;
+    eprintln!("warning: {} samples ({share:.1e} of all) were NaN, infinite or negative and left out", report.bad.count);
+    for bad in &report.bad.first {
+        let (x, y) = (bad.pixel.x, bad.pixel.y);
+        eprintln!("warning:   {:?}; repeat with --pixel {x},{y} --sample {} --seed {seed}", bad.value, bad.sample);
+    }
+}
+
 /// Largest resident size of the process so far in MiB, where the system tells.
-pub fn peak_memory() -> Option<u64> {
+fn peak_memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
     line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib >> 10)

@@ -47,6 +47,7 @@
     return Math.min(box.offsetWidth / size[0], box.offsetHeight / size[1]);
   }
   function place() {
+    if (!values) return;
     const zoom = view.zoom || fitting(), canvas = $('canvas');
     canvas.style.width = `${size[0] * zoom}px`;
     canvas.style.height = `${size[1] * zoom}px`;
@@ -74,6 +75,7 @@
     $('pixel').replaceChildren(part('Pixel', `${x}, ${y}`), ...['R', 'G', 'B'].map((name, c) => part(name, digits(values[at + c]))));
   }
   function choose(x, y) {
+    if (!values) return;
     view.pixel = [Math.min(size[0] - 1, Math.max(0, x)), Math.min(size[1] - 1, Math.max(0, y))];
     place(); tell();
   }
@@ -84,6 +86,7 @@
     paint();
   }
   function zoomBy(factor) {
+    if (!values) return;
     const box = $('view'), from = view.zoom || fitting(), to = Math.min(64, Math.max(0.05, from * factor));
     // What is in the middle stays there.
     const middle = [box.scrollLeft + box.clientWidth / 2, box.scrollTop + box.clientHeight / 2];
