@@ -6,6 +6,7 @@ mod depth;
 mod direct;
 mod moment;
 mod path;
+mod path_kernel;
 mod volpath;
 mod volpathmis;
 

@@ -5,11 +5,15 @@
 //! roulette on the throughput. A sample that met nothing but surfaces that let it straight through, and no environment,
 //! is transparent: alpha 0 and, as in the reference, no colour. Surfaces only; `volpath` also looks through index-matched surfaces on the way to a light.
 //!
+//! With a nested guide directions come from a mixture of the BSDF and of what earlier samples have taught. The picture
+//! stays unbiased. Such a `path` cannot be nested itself, since its samples depend on each other.
+//!
 //! | parameter | type | default | meaning |
 //! |---|---|---|---|
 //! | `max_depth` | integer | -1 | longest path: 0 black, 1 lights only, 2 direct light, -1 no limit |
 //! | `rr_depth` | integer | 5 | depth from which Russian roulette may end a path, at least 1 |
 //! | `hide_emitters` | boolean | false | lights are not seen directly; the light they give is unchanged |
+//! | (nested) | guide | unset | learns where light comes from, as `sd_tree` |
 //!
 //! ```xml
 //! <integrator type="path">
@@ -17,16 +21,14 @@
 //! </integrator>
 //! ```
 
-use super::common::{
-    COMMON, PATH, PathLimits, Scattered, find_surface_without_light, forward_integrator, mis_weight, survival, timeout,
-    weighted_emission,
-};
-use lucerna_core::color::Rgb;
-use lucerna_core::interfaces::{
-    Arena, Bxdf, CameraRay, Integrator, LightSample, Lobes, Radiance, RadianceEstimator, SurfaceHit, Transport,
+use super::common::{COMMON, PATH, PathLimits, timeout};
+use super::path_kernel::{Guided, Unguided, trace};
+use lucerna_core::interfaces::{Arena, CameraRay, Guide, Integrator, Radiance, RadianceEstimator};
+use lucerna_core::render::{
+    Guidance, GuidedEstimator, Notebook, RenderContext, RenderError, Report, render_estimator, render_guided,
 };
 use lucerna_core::sampling::Stream;
-use lucerna_core::scene::{Built, Constructor, Plugin, Properties, Scene};
+use lucerna_core::scene::{Built, Constructor, ObjectKind, Param, Plugin, Properties, Scene};
 use std::sync::Arc;
 
 /// Table entry.
@@ -34,20 +36,37 @@ pub const PLUGIN: Plugin = Plugin {
     name: "path",
     aliases: &[],
     summary: "path tracing with emitter sampling and multiple importance sampling",
-    params: &[COMMON, PATH],
+    params: &[COMMON, PATH, &[Param::child(ObjectKind::Guide, 0, 1, "learns where light comes from")]],
     build: Constructor::Integrator(build),
 };
 
 fn build(p: &Properties<'_>) -> Built<dyn Integrator> {
-    Ok(Arc::new(Path { limits: PathLimits::new(p), timeout: timeout(p) }))
+    Ok(Arc::new(Path { limits: PathLimits::new(p), timeout: timeout(p), guide: p.guide() }))
 }
 
 struct Path {
     limits: PathLimits,
     timeout: Option<f64>,
+    guide: Option<Arc<dyn Guide>>,
 }
 
-forward_integrator!(Path);
+impl Integrator for Path {
+    fn render(&self, cx: &mut RenderContext<'_>) -> Result<Report, RenderError> {
+        match &self.guide {
+            None => render_estimator(cx, self),
+            Some(guide) => render_guided(cx, self, &**guide).map(|(report, _)| report),
+        }
+    }
+
+    fn timeout(&self) -> Option<f64> {
+        self.timeout
+    }
+
+    /// Samples that are guided depend on those before.
+    fn estimator(&self) -> Option<&dyn RadianceEstimator> {
+        self.guide.is_none().then_some(self)
+    }
+}
 
 impl RadianceEstimator for Path {
     fn radiance(
@@ -58,95 +77,22 @@ impl RadianceEstimator for Path {
         arena: &mut Arena,
         _aovs: &mut [f32],
     ) -> Radiance {
-        let PathLimits { max_depth, rr_depth, hide_emitters } = self.limits;
-        let mut found = Radiance::default();
-        if max_depth == 0 {
-            return found;
-        }
-        let visible_environment = !hide_emitters && scene.environment().is_some();
-        found.alpha = f32::from(visible_environment);
-        let mut ray = camera.ray;
-        let mut throughput = Rgb::WHITE;
-        let mut eta = 1.0;
-        // Of the vertex before; none at the camera and after a delta lobe, where light sampling has no part.
-        let mut last: Option<Scattered> = None;
-        let mut depth = 0;
-        let mut hit = SurfaceHit::default();
-        loop {
-            let hidden = hide_emitters && depth == 0;
-            let met = if hidden {
-                find_surface_without_light(scene, &ray, &mut hit, &mut found.rays)
-            } else {
-                found.rays += 1;
-                scene.find_surface(&ray, &mut hit)
-            };
-            if !hidden {
-                found.rgb += throughput * weighted_emission(scene, &ray, met.then_some(&hit), last, mis_weight);
-            }
-            if !met {
-                break;
-            }
-            if depth + 1 >= max_depth {
-                if depth == 0 && !found.rgb.is_black() {
-                    found.alpha = 1.0;
-                }
-                break;
-            }
-            let bsdf = scene.bsdf(&hit);
-            let bxdf = bsdf.resolve(&hit, arena);
-            if bsdf.lobes().is_smooth()
-                && let Some((_, light)) = scene.sample_emitter(hit.p, stream.next_2d())
-            {
-                found.rgb += throughput * direct_light(scene, &hit, bxdf, &light, &mut found.rays);
-            }
-            let (u1, u2) = (stream.next_1d(), stream.next_2d());
-            let sample = bxdf.sample(hit.wi, u1, u2, Transport::Radiance);
-            // Drawn at every vertex, needed or not: the numbers of the next sample depend on it in the reference's order.
-            let u_roulette = stream.next_1d();
-            let Some(sample) = sample.filter(|sample| scene.keeps_sides(&hit, sample.wo)) else {
-                found.alpha = 1.0;
-                break;
-            };
-            throughput *= sample.weight;
-            eta *= sample.eta;
-            if sample.lobe != Lobes::NULL {
-                found.alpha = 1.0;
-            }
-            let d = hit.to_world(sample.wo);
-            ray = hit.leave(d);
-            last = (!sample.lobe.has_delta()).then_some(Scattered { p: hit.p, pdf: sample.pdf });
-            depth += 1;
-
-            if throughput.is_black() {
-                break;
-            }
-            if depth >= rr_depth {
-                let q = survival(throughput, eta);
-                if u_roulette >= q {
-                    break;
-                }
-                throughput *= 1.0 / q;
-            }
-        }
-        if found.alpha == 0.0 {
-            found.rgb = Rgb::BLACK;
-        }
-        found
+        trace(self.limits, scene, camera, stream, arena, &mut Unguided)
     }
 }
 
-/// Light of one emitter sample scattered at a hit, weighted against BSDF sampling.
-#[inline]
-fn direct_light(scene: &Scene, hit: &SurfaceHit, bxdf: &dyn Bxdf, light: &LightSample, rays: &mut u32) -> Rgb {
-    let wo = hit.to_local(light.point.d);
-    let (value, pdf) = bxdf.eval_pdf(hit.wi, wo, Transport::Radiance);
-    let contribution = value * light.weight;
-    if contribution.is_black() || !scene.keeps_sides(hit, wo) {
-        return Rgb::BLACK;
+impl GuidedEstimator for Path {
+    fn radiance(
+        &self,
+        scene: &Scene,
+        camera: &CameraRay,
+        stream: &mut Stream<'_>,
+        arena: &mut Arena,
+        _aovs: &mut [f32],
+        guidance: Guidance<'_>,
+        notes: &mut Notebook,
+    ) -> Radiance {
+        let arena = &*arena;
+        trace(self.limits, scene, camera, stream, arena, &mut Guided { guidance, notes, arena })
     }
-    *rays += 1;
-    if !scene.visible(hit, light) {
-        return Rgb::BLACK;
-    }
-    contribution * if light.delta { 1.0 } else { mis_weight(light.pdf, pdf) }
 }

@@ -17,6 +17,7 @@
 mod bsdf;
 mod emitter;
 mod film;
+mod guide;
 mod integrator;
 mod rfilter;
 mod sampler;
@@ -28,6 +29,10 @@ mod texture;
 pub use bsdf::{Arena, Bsdf, Bxdf, BxdfSample, Lobes, Transport};
 pub use emitter::{Emitter, EmitterFlags, LightPoint, LightSample};
 pub use film::{ComponentFormat, FileFormat, Film, FilmSettings, PixelFormat};
+pub use guide::{
+    Combination, EmitterSampling, Guide, GuideField, GuideLearner, GuideRecord, GuidedDirections, MOST_GUIDED,
+    RecordKind, Training,
+};
 pub use integrator::{Integrator, Radiance, RadianceEstimator};
 pub use rfilter::Rfilter;
 pub use sampler::{Sampler, mix, stream};

@@ -263,6 +263,7 @@ impl<'a> Builder<'a> {
             Constructor::Emitter(f) => f(&properties).map(Object::Emitter),
             Constructor::Bsdf(f) => f(&properties).map(Object::Bsdf),
             Constructor::Texture(f) => f(&properties).map(Object::Texture),
+            Constructor::Guide(f) => f(&properties).map(Object::Guide),
             Constructor::Sensor(f) => {
                 f(&properties).and_then(|sensor| match (properties.film(), properties.sampler()) {
                     (Some(film), Some(sampler)) => Ok(Object::Sensor(BuiltSensor { sensor, film, sampler })),

@@ -1,6 +1,6 @@
 //! A built object of any kind.
 
-use crate::interfaces::{Bsdf, Emitter, Film, Integrator, Rfilter, Sampler, Sensor, Shape, Texture};
+use crate::interfaces::{Bsdf, Emitter, Film, Guide, Integrator, Rfilter, Sampler, Sensor, Shape, Texture};
 use std::sync::Arc;
 
 /// A shape with what the scene hangs on it.
@@ -38,4 +38,5 @@ pub enum Object {
     Shape(BuiltShape),
     Bsdf(Arc<dyn Bsdf>),
     Texture(Arc<dyn Texture>),
+    Guide(Arc<dyn Guide>),
 }

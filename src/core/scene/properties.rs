@@ -12,7 +12,7 @@ use super::object::{BuiltShape, Object};
 use super::param::{Default, Param, ParamType, Slot};
 use super::registry::{Failed, Plugin};
 use crate::color::{Rgb, ior, spectrum};
-use crate::interfaces::{Bsdf, ColorSource, Film, Integrator, Rfilter, Sampler, ScalarSource, Shape, Texture};
+use crate::interfaces::{Bsdf, ColorSource, Film, Guide, Integrator, Rfilter, Sampler, ScalarSource, Shape, Texture};
 use crate::math::{Transform, Vec3};
 use glam::DMat4;
 use std::cell::{Cell, RefCell};
@@ -387,6 +387,11 @@ impl<'a> Properties<'a> {
     /// The nested reconstruction filter.
     pub fn rfilter(&self) -> Option<Arc<dyn Rfilter>> {
         self.of_kind(|o| if let Object::Rfilter(x) = o { Some(x.clone()) } else { None }).pop()
+    }
+
+    /// The nested guide.
+    pub fn guide(&self) -> Option<Arc<dyn Guide>> {
+        self.of_kind(|o| if let Object::Guide(x) = o { Some(x.clone()) } else { None }).pop()
     }
 
     /// The nested film.

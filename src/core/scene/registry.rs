@@ -6,7 +6,7 @@
 use super::description::ObjectKind;
 use super::param::Param;
 use super::properties::Properties;
-use crate::interfaces::{Bsdf, Emitter, Film, Integrator, Rfilter, Sampler, Sensor, Shape, Texture};
+use crate::interfaces::{Bsdf, Emitter, Film, Guide, Integrator, Rfilter, Sampler, Sensor, Shape, Texture};
 use std::sync::Arc;
 
 /// Returned by a constructor that could not go on. What was wrong has been told to [`Properties`].
@@ -29,6 +29,7 @@ pub enum Constructor {
     Shape(fn(&Properties<'_>) -> Built<dyn Shape>),
     Bsdf(fn(&Properties<'_>) -> Built<dyn Bsdf>),
     Texture(fn(&Properties<'_>) -> Built<dyn Texture>),
+    Guide(fn(&Properties<'_>) -> Built<dyn Guide>),
 }
 
 impl Constructor {
@@ -44,6 +45,7 @@ impl Constructor {
             Constructor::Shape(_) => ObjectKind::Shape,
             Constructor::Bsdf(_) => ObjectKind::Bsdf,
             Constructor::Texture(_) => ObjectKind::Texture,
+            Constructor::Guide(_) => ObjectKind::Guide,
         }
     }
 }
