@@ -7,6 +7,7 @@
 pub mod bsdfs;
 pub mod emitters;
 pub mod films;
+pub mod guides;
 pub mod integrators;
 pub mod light_samplers;
 pub mod rfilters;
@@ -27,6 +28,7 @@ pub fn builtin() -> Registry {
         .add_all(integrators::PLUGINS)
         .add_all(sensors::PLUGINS)
         .add_all(films::PLUGINS)
+        .add_all(guides::PLUGINS)
         .add_all(rfilters::PLUGINS)
         .add_all(samplers::PLUGINS)
         .add_all(light_samplers::PLUGINS)

@@ -7,6 +7,7 @@ mod direct;
 mod lights;
 mod moment;
 mod path;
+mod path_kernel;
 mod volpath;
 mod volpathmis;
 

@@ -5,12 +5,16 @@
 //! roulette on the throughput. A sample that met nothing but surfaces that let it straight through, and no environment,
 //! is transparent: alpha 0 and, as in the reference, no colour. Surfaces only; `volpath` also looks through index-matched surfaces on the way to a light.
 //!
+//! With a nested guide directions come from a mixture of the BSDF and of what earlier samples have taught. The picture
+//! stays unbiased. Such a `path` cannot be nested itself, since its samples depend on each other.
+//!
 //! | parameter | type | default | meaning |
 //! |---|---|---|---|
 //! | `max_depth` | integer | -1 | longest path: 0 black, 1 lights only, 2 direct light, -1 no limit |
 //! | `rr_depth` | integer | 5 | depth from which Russian roulette may end a path, at least 1 |
 //! | `hide_emitters` | boolean | false | lights are not seen directly; the light they give is unchanged |
 //! | nested `light_sampler` | | by the scene's weights | which light a vertex samples |
+//! | (nested) | guide | unset | learns where light comes from, as `sd_tree` |
 //!
 //! ```xml
 //! <integrator type="path">
@@ -18,17 +22,15 @@
 //! </integrator>
 //! ```
 
-use super::common::{
-    COMMON, PATH, PathLimits, Scattered, find_surface, forward_integrator, mis_weight, survival, timeout,
-    weighted_emission,
-};
-use super::lights::{ByScene, LIGHTS, Lights, PickLights};
-use lucerna_core::color::Rgb;
-use lucerna_core::interfaces::{
-    Arena, Bxdf, CameraRay, Integrator, LightSample, Lobes, Radiance, RadianceEstimator, SurfaceHit, Transport,
+use super::common::{COMMON, PATH, PathLimits, timeout};
+use super::lights::{ByScene, LIGHTS, Lights};
+use super::path_kernel::{Guided, Unguided, trace};
+use lucerna_core::interfaces::{Arena, CameraRay, Guide, Integrator, Radiance, RadianceEstimator};
+use lucerna_core::render::{
+    Guidance, GuidedEstimator, Notebook, RenderContext, RenderError, Report, render_estimator, render_guided,
 };
 use lucerna_core::sampling::Stream;
-use lucerna_core::scene::{Built, Constructor, Plugin, Properties, Scene};
+use lucerna_core::scene::{Built, Constructor, ObjectKind, Param, Plugin, Properties, Scene};
 use std::sync::Arc;
 
 /// Table entry.
@@ -36,26 +38,53 @@ pub const PLUGIN: Plugin = Plugin {
     name: "path",
     aliases: &[],
     summary: "path tracing with emitter sampling and multiple importance sampling",
-    params: &[COMMON, PATH, &[LIGHTS]],
+    params: &[COMMON, PATH, &[LIGHTS, Param::child(ObjectKind::Guide, 0, 1, "learns where light comes from")]],
     build: Constructor::Integrator(build),
 };
 
 fn build(p: &Properties<'_>) -> Built<dyn Integrator> {
-    Ok(Arc::new(Path { limits: PathLimits::new(p), lights: Lights::new(p), timeout: timeout(p) }))
+    Ok(Arc::new(Path { limits: PathLimits::new(p), lights: Lights::new(p), timeout: timeout(p), guide: p.guide() }))
 }
 
 struct Path {
     limits: PathLimits,
     lights: Lights,
     timeout: Option<f64>,
+    guide: Option<Arc<dyn Guide>>,
 }
 
-forward_integrator!(Path);
+impl Path {
+    /// With lights that are ready for a scene; `None` where nothing has to be made.
+    fn prepared(&self, scene: &Scene) -> Option<Self> {
+        let lights = self.lights.prepare(scene)?;
+        Some(Path { lights, guide: self.guide.clone(), ..*self })
+    }
+}
+
+impl Integrator for Path {
+    fn render(&self, cx: &mut RenderContext<'_>) -> Result<Report, RenderError> {
+        match &self.guide {
+            None => render_estimator(cx, self),
+            Some(guide) => {
+                let prepared = self.prepared(cx.scene);
+                render_guided(cx, prepared.as_ref().unwrap_or(self), &**guide).map(|(report, _)| report)
+            }
+        }
+    }
+
+    fn timeout(&self) -> Option<f64> {
+        self.timeout
+    }
+
+    /// Samples that are guided depend on those before.
+    fn estimator(&self) -> Option<&dyn RadianceEstimator> {
+        self.guide.is_none().then_some(self)
+    }
+}
 
 impl RadianceEstimator for Path {
     fn prepare(&self, scene: &Scene) -> Option<Box<dyn RadianceEstimator + '_>> {
-        let lights = self.lights.prepare(scene)?;
-        Some(Box::new(Path { lights, ..*self }))
+        Some(Box::new(self.prepared(scene)?))
     }
 
     fn radiance(
@@ -67,128 +96,28 @@ impl RadianceEstimator for Path {
         _aovs: &mut [f32],
     ) -> Radiance {
         match self.lights.ready() {
-            None => self.trace(scene, &ByScene, camera, stream, arena),
-            Some(lights) => self.trace(scene, &lights, camera, stream, arena),
+            None => trace(self.limits, scene, &ByScene, camera, stream, arena, &mut Unguided),
+            Some(lights) => trace(self.limits, scene, &lights, camera, stream, arena, &mut Unguided),
         }
     }
 }
 
-impl Path {
-    /// A camera path whose lights are picked by `lights`.
-    fn trace(
+impl GuidedEstimator for Path {
+    fn radiance(
         &self,
         scene: &Scene,
-        lights: &impl PickLights,
         camera: &CameraRay,
         stream: &mut Stream<'_>,
         arena: &mut Arena,
+        _aovs: &mut [f32],
+        guidance: Guidance<'_>,
+        notes: &mut Notebook,
     ) -> Radiance {
-        let PathLimits { max_depth, rr_depth, hide_emitters } = self.limits;
-        let mut found = Radiance::default();
-        if max_depth == 0 {
-            return found;
+        let arena = &*arena;
+        let mut directions = Guided { guidance, notes, arena };
+        match self.lights.ready() {
+            None => trace(self.limits, scene, &ByScene, camera, stream, arena, &mut directions),
+            Some(lights) => trace(self.limits, scene, &lights, camera, stream, arena, &mut directions),
         }
-        let visible_environment = !hide_emitters && scene.environment().is_some();
-        found.alpha = f32::from(visible_environment);
-        let mut ray = camera.ray;
-        let mut throughput = Rgb::WHITE;
-        let mut eta = 1.0;
-        // Of the vertex before; none at the camera and after a delta lobe, where light sampling has no part.
-        let mut last: Option<Scattered> = None;
-        let mut depth = 0;
-        let mut hit = SurfaceHit::default();
-        loop {
-            let hidden = hide_emitters && depth == 0;
-            let met = find_surface(scene, &ray, hidden, &mut hit, &mut found.rays);
-            if !hidden {
-                found.rgb += throughput * weighted_emission(scene, lights, &ray, met.then_some(&hit), last, mis_weight);
-            }
-            if !met {
-                break;
-            }
-            if depth + 1 >= max_depth {
-                if depth == 0 && !found.rgb.is_black() {
-                    found.alpha = 1.0;
-                }
-                break;
-            }
-            let bsdf = scene.bsdf(&hit);
-            let bxdf = bsdf.resolve(&hit, arena);
-            let lobes = bsdf.lobes();
-            let from = lights.vertex(&hit, lobes);
-            let worth = |light: &LightSample| {
-                let (contribution, pdf) = scattered(scene, &hit, bxdf, light);
-                (contribution * weight_of(light, pdf)).luminance()
-            };
-            if lobes.is_smooth()
-                && let Some(light) = lights.sample(scene, &from, stream, worth)
-            {
-                found.rgb += throughput * direct_light(scene, &hit, bxdf, &light, &mut found.rays);
-            }
-            let (u1, u2) = (stream.next_1d(), stream.next_2d());
-            let sample = bxdf.sample(hit.wi, u1, u2, Transport::Radiance);
-            // Drawn at every vertex, needed or not: the numbers of the next sample depend on it in the reference's order.
-            let u_roulette = stream.next_1d();
-            let Some(sample) = sample.filter(|sample| scene.keeps_sides(&hit, sample.wo)) else {
-                found.alpha = 1.0;
-                break;
-            };
-            throughput *= sample.weight;
-            eta *= sample.eta;
-            if sample.lobe != Lobes::NULL {
-                found.alpha = 1.0;
-            }
-            let d = hit.to_world(sample.wo);
-            ray = hit.leave(d);
-            last = (!sample.lobe.has_delta()).then_some(Scattered { from, pdf: sample.pdf });
-            depth += 1;
-
-            if throughput.is_black() {
-                break;
-            }
-            if depth >= rr_depth {
-                let q = survival(throughput, eta);
-                if u_roulette >= q {
-                    break;
-                }
-                throughput *= 1.0 / q;
-            }
-        }
-        if found.alpha == 0.0 {
-            found.rgb = Rgb::BLACK;
-        }
-        found
     }
-}
-
-/// Light of one emitter sample scattered at a hit, weighted against BSDF sampling.
-#[inline]
-fn direct_light(scene: &Scene, hit: &SurfaceHit, bxdf: &dyn Bxdf, light: &LightSample, rays: &mut u32) -> Rgb {
-    let (contribution, pdf) = scattered(scene, hit, bxdf, light);
-    if contribution.is_black() {
-        return Rgb::BLACK;
-    }
-    *rays += 1;
-    if !scene.visible(hit, light) {
-        return Rgb::BLACK;
-    }
-    contribution * weight_of(light, pdf)
-}
-
-/// The same without the weight and as if nothing stood between, and the density of BSDF sampling.
-#[inline]
-fn scattered(scene: &Scene, hit: &SurfaceHit, bxdf: &dyn Bxdf, light: &LightSample) -> (Rgb, f32) {
-    let wo = hit.to_local(light.point.d);
-    let (value, pdf) = bxdf.eval_pdf(hit.wi, wo, Transport::Radiance);
-    let contribution = value * light.weight;
-    if contribution.is_black() || !scene.keeps_sides(hit, wo) {
-        return (Rgb::BLACK, pdf);
-    }
-    (contribution, pdf)
-}
-
-/// Weight of emitter sampling against BSDF sampling with density `pdf`.
-#[inline]
-fn weight_of(light: &LightSample, pdf: f32) -> f32 {
-    if light.delta { 1.0 } else { mis_weight(light.pdf, pdf) }
 }

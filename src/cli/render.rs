@@ -10,7 +10,9 @@ use lucerna_core::image::{self, exr, png};
 use lucerna_core::interfaces::{ComponentFormat, FileFormat, Integrator};
 use lucerna_core::math::UVec2;
 use lucerna_core::render::{Budget, Control, FilmStore, OnPass, PassEnd, RenderContext, Report, SampleOrder, replay};
-use lucerna_core::scene::{BuiltSensor, Description, Object, ObjectKind, Parameter, Registry, Scene, Value, build_one};
+use lucerna_core::scene::{
+    BuiltSensor, Description, NodeId, Object, ObjectKind, Parameter, Registry, Scene, Value, build_one,
+};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -50,6 +52,10 @@ pub struct Arguments {
     /// Another integrator, as NAME or NAME:parameter=value,…
     #[arg(long, value_name = "NAME")]
     integrator: Option<String>,
+
+    /// A guide for the integrator, as NAME or NAME:parameter=value,…
+    #[arg(long, value_name = "NAME")]
+    guide: Option<String>,
 
     /// Another sampler, as NAME or NAME:parameter=value,…
     #[arg(long, value_name = "NAME")]
@@ -136,7 +142,15 @@ pub fn run(registry: &Registry, arguments: &Arguments) -> Result<ExitCode, Failu
     super::set_threads(arguments.threads)?;
     let mut description = arguments.scene.describe()?;
     if let Some(text) = &arguments.integrator {
-        replace_child(&mut description, ObjectKind::Integrator, text)?;
+        let root = description.root;
+        replace_child(&mut description, root, ObjectKind::Integrator, text)?;
+    }
+    if let Some(text) = &arguments.guide {
+        let of_kind = |id| description.node(id).kind == ObjectKind::Integrator;
+        let integrator = description.children(description.root).map(|(_, child)| child).find(|child| of_kind(*child));
+        let integrator =
+            integrator.ok_or_else(|| Failure::new("--guide needs an integrator, and the scene has none"))?;
+        replace_child(&mut description, integrator, ObjectKind::Guide, text)?;
     }
     if let Some(text) = &arguments.light_sampler {
         let node = short_form::parse(ObjectKind::LightSampler, text, "--light-sampler").map_err(Failure::new)?;
@@ -374,6 +388,7 @@ fn summary(
     }
     let line = format!("{}: {}", output.display(), seen.tell(report, cx.store.size()));
     if !arguments.quiet {
+        report.notes.iter().for_each(|note| eprintln!("{note}"));
         eprintln!("{line}");
     }
     if let Some(path) = &arguments.stats_json {
@@ -383,18 +398,17 @@ fn summary(
     Ok(line)
 }
 
-/// Puts an object from the command line in the place of the scene's own.
-fn replace_child(description: &mut Description, kind: ObjectKind, text: &str) -> Result<(), Failure> {
+/// Puts an object from the command line in the place of the parent's own.
+fn replace_child(description: &mut Description, parent: NodeId, kind: ObjectKind, text: &str) -> Result<(), Failure> {
     let node = short_form::parse(kind, text, &format!("--{}", kind.tag())).map_err(Failure::new)?;
     let at = node.at.clone();
     let id = description.add(node);
-    let root = description.root;
     let old: Vec<String> = description
-        .children(root)
+        .children(parent)
         .filter(|(_, child)| description.node(*child).kind == kind)
         .map(|(parameter, _)| parameter.name.clone())
         .collect();
-    let parameters = &mut description.node_mut(root).parameters;
+    let parameters = &mut description.node_mut(parent).parameters;
     parameters.retain(|p| !old.contains(&p.name));
     parameters.push(Parameter { name: format!("_{}", kind.tag()), value: Value::Object(id), at });
     Ok(())

@@ -17,8 +17,8 @@ mod textures;
 use lucerna::core::scene::ObjectKind;
 
 /// Sensors, films and integrators have no density of their own to test: they are under test in `plugins` beside their
-/// code, and whole pictures in `tests/analytic.rs` and `tests/references.rs`.
-const ELSEWHERE: [ObjectKind; 3] = [ObjectKind::Sensor, ObjectKind::Film, ObjectKind::Integrator];
+/// code, and whole pictures in `tests/analytic.rs` and `tests/references.rs`. Guides are in `tests/guiding`.
+const ELSEWHERE: [ObjectKind; 4] = [ObjectKind::Sensor, ObjectKind::Film, ObjectKind::Integrator, ObjectKind::Guide];
 const HERE: [ObjectKind; 7] = [
     ObjectKind::Bsdf,
     ObjectKind::Emitter,

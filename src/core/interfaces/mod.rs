@@ -17,6 +17,7 @@
 mod bsdf;
 mod emitter;
 mod film;
+mod guide;
 mod integrator;
 mod light_sampler;
 mod rfilter;
@@ -29,6 +30,10 @@ mod texture;
 pub use bsdf::{Arena, Bsdf, Bxdf, BxdfSample, Lobes, Transport};
 pub use emitter::{Emitter, EmitterFlags, LightBounds, LightPoint, LightSample};
 pub use film::{ComponentFormat, FileFormat, Film, FilmSettings, PixelFormat};
+pub use guide::{
+    Combination, EmitterSampling, Guide, GuideField, GuideLearner, GuideRecord, GuidedDirections, MOST_GUIDED,
+    RecordKind, Training,
+};
 pub use integrator::{Integrator, Radiance, RadianceEstimator};
 pub use light_sampler::{Light, LightSampler, LightSelection, LightVertex, long_number};
 pub use rfilter::Rfilter;

@@ -139,6 +139,11 @@ impl<'a> Control<'a> {
         self.started.elapsed().saturating_sub(Duration::from_nanos(self.aside.load(Ordering::Relaxed)))
     }
 
+    /// Whether anybody looks at the picture between passes.
+    pub(crate) fn watches_passes(&self) -> bool {
+        self.on_pass.is_some()
+    }
+
     /// To be called between passes.
     pub(crate) fn end_pass(&self, spp: u32, film: &FilmSettings, store: &FilmStore) -> ControlFlow<()> {
         let Some(on_pass) = self.on_pass else { return ControlFlow::Continue(()) };

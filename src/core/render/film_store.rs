@@ -55,6 +55,29 @@ impl FilmStore {
         }
     }
 
+    /// Adds another film of the same layout, each pixel (counted row by row) times a factor.
+    pub(crate) fn add_weighted(&mut self, other: &FilmStore, factor: impl Fn(usize) -> f64) {
+        debug_assert!(self.size == other.size && self.aovs == other.aovs);
+        let stride = self.stride();
+        let pixels = self.sums.chunks_exact_mut(stride).zip(other.sums.chunks_exact(stride));
+        for (pixel, (sums, more)) in pixels.enumerate() {
+            let factor = factor(pixel);
+            for (sum, more) in sums.iter_mut().zip(more) {
+                *sum += factor * more;
+            }
+        }
+    }
+
+    /// Adds one sample to one pixel, as a box filter does.
+    #[cfg(test)]
+    pub(crate) fn add_sample(&mut self, pixel: UVec2, value: Radiance) {
+        let at = (pixel.y as usize * self.size.x as usize + pixel.x as usize) * self.stride();
+        let values = [value.rgb.r, value.rgb.g, value.rgb.b, value.alpha, 1.0];
+        for (sum, v) in self.sums[at..at + FIXED].iter_mut().zip(values) {
+            *sum += f64::from(v);
+        }
+    }
+
     pub(crate) fn add_tile(&mut self, tile: &TileStore) {
         let stride = self.stride();
         debug_assert_eq!(stride, tile.stride);

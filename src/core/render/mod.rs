@@ -5,17 +5,22 @@
 //! threads, and a run that stops early has the bits of a run that was asked for that many samples.
 
 mod bad_samples;
+mod combine;
 mod control;
 mod film_store;
+mod notebook;
 mod reference_order;
 mod tabulated_filter;
 mod tiles;
+mod training;
 
 pub use bad_samples::{BadSample, BadSamples};
 pub use control::{Budget, Control, OnPass, PassEnd, Progress, Schedule};
 pub use film_store::FilmStore;
+pub use notebook::{Notebook, Scattering};
 pub use reference_order::ReferenceOrder;
 pub use tiles::{render_estimator, replay};
+pub use training::{Guidance, GuidedEstimator, render_guided};
 
 use crate::image::Image;
 use crate::interfaces::{FilmSettings, Sampler, Sensor};
@@ -149,6 +154,8 @@ pub struct Report {
     pub seconds: f64,
     /// Samples that were dropped.
     pub bad: BadSamples,
+    /// What the integrator has to tell, a line each.
+    pub notes: Vec<String>,
     /// The user or the clock stopped it before the asked number of samples.
     pub stopped: bool,
 }

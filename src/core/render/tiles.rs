@@ -1,13 +1,15 @@
-//! The loop over passes, tiles, pixels and samples that all forward estimators share.
+//! The loop over passes, tiles, pixels and samples that all forward estimators share, also those that learn
+//! ([`super::training`]).
 
 use super::film_store::TileStore;
 use super::{
-    BadSample, BadSamples, Budget, Progress, ReferenceOrder, RenderContext, RenderError, Report, SampleOrder, Schedule,
-    Window,
+    BadSample, BadSamples, Budget, FilmStore, Progress, ReferenceOrder, RenderContext, RenderError, Report,
+    SampleOrder, Schedule, Window,
 };
-use crate::interfaces::{Arena, Radiance, RadianceEstimator, stream};
+use crate::interfaces::{Arena, CameraRay, Radiance, RadianceEstimator, stream};
 use crate::math::{UVec2, Vec2};
 use crate::sampling::{PointSet, Stream};
+use crate::scene::Scene;
 use glam::IVec2;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -21,94 +23,144 @@ const BATCH: usize = 1024;
 /// Samples per pixel that a run with a time limit plans for: enough for any budget.
 const ENDLESS: u32 = 1 << 24;
 
+/// Takes the samples of a run. Each tile notes something besides its pixels.
+pub(super) trait Tracer: Sync {
+    /// What a tile notes.
+    type Notes: Send;
+
+    /// Nothing noted yet.
+    fn notes(&self) -> Self::Notes;
+
+    /// As [`RadianceEstimator::wants_differentials`].
+    fn wants_differentials(&self) -> bool;
+
+    /// As [`RadianceEstimator::radiance`].
+    fn radiance(
+        &self,
+        scene: &Scene,
+        camera: &CameraRay,
+        stream: &mut Stream<'_>,
+        arena: &mut Arena,
+        aovs: &mut [f32],
+        notes: &mut Self::Notes,
+    ) -> Radiance;
+
+    /// Told of each sample that enters the film, and its pixel relative to the crop window.
+    fn taken(&self, notes: &mut Self::Notes, pixel: IVec2, value: Radiance);
+}
+
+/// An estimator that learns nothing.
+impl Tracer for &dyn RadianceEstimator {
+    type Notes = ();
+
+    fn notes(&self) {}
+
+    #[inline]
+    fn wants_differentials(&self) -> bool {
+        (**self).wants_differentials()
+    }
+
+    #[inline]
+    fn radiance(
+        &self,
+        scene: &Scene,
+        camera: &CameraRay,
+        stream: &mut Stream<'_>,
+        arena: &mut Arena,
+        aovs: &mut [f32],
+        (): &mut (),
+    ) -> Radiance {
+        (**self).radiance(scene, camera, stream, arena, aovs)
+    }
+
+    #[inline]
+    fn taken(&self, (): &mut (), _pixel: IVec2, _value: Radiance) {}
+}
+
 /// Renders an estimator into the context's film until the budget is spent.
 pub fn render_estimator(cx: &mut RenderContext<'_>, estimator: &dyn RadianceEstimator) -> Result<Report, RenderError> {
     let prepared = estimator.prepare(cx.scene);
     let estimator = prepared.as_deref().unwrap_or(estimator);
-    let asked = match cx.budget {
-        Budget::Samples(spp) => cx.sampler.round_spp(spp),
-        Budget::Seconds(_) => ENDLESS,
-    };
-    let points = match cx.order {
-        SampleOrder::PerSample => cx.sampler.point_set(cx.seed, asked, cx.film.size),
-        SampleOrder::Reference { .. } => None,
-    };
-    let run =
-        Run { cx, estimator, points: points.as_deref(), reference: cx.reference_order(), taken: AtomicU64::new(0) };
-    let (report, store) = run.passes(asked)?;
+    let asked = asked_spp(cx);
+    let points = points(cx, asked);
+    let run = Run::new(cx, points.as_deref(), asked);
+    let (report, store) = run.passes(&estimator)?;
     cx.store = store;
     Ok(report)
+}
+
+/// Samples per pixel of the whole run, as far as is known.
+pub(super) fn asked_spp(cx: &RenderContext<'_>) -> u32 {
+    match cx.budget {
+        Budget::Samples(spp) => cx.sampler.round_spp(spp),
+        Budget::Seconds(_) => ENDLESS,
+    }
+}
+
+/// The point set of a run of so many samples per pixel.
+pub(super) fn points(cx: &RenderContext<'_>, asked: u32) -> Option<Box<dyn PointSet>> {
+    match cx.order {
+        SampleOrder::PerSample => cx.sampler.point_set(cx.seed, asked, cx.film.size),
+        SampleOrder::Reference { .. } => None,
+    }
 }
 
 /// The value of one pixel sample, with the very numbers it has in a full run. `pixel` belongs to the full film.
 pub fn replay(cx: &RenderContext<'_>, estimator: &dyn RadianceEstimator, pixel: UVec2, sample: u32) -> Radiance {
     let prepared = estimator.prepare(cx.scene);
     let estimator = prepared.as_deref().unwrap_or(estimator);
-    let spp = match cx.budget {
-        Budget::Samples(spp) => cx.sampler.round_spp(spp),
-        Budget::Seconds(_) => ENDLESS,
-    };
-    let points = cx.sampler.point_set(cx.seed, spp, cx.film.size);
+    let points = cx.sampler.point_set(cx.seed, asked_spp(cx), cx.film.size);
     let mut stream = stream(points.as_deref(), cx.seed, pixel, sample);
     let mut aovs = vec![0.0; cx.store.aovs().len()];
-    sample_pixel(cx, estimator, pixel.as_ivec2(), &mut stream, &mut Arena::new(), &mut aovs).1
+    sample_pixel(cx, &estimator, pixel.as_ivec2(), &mut stream, &mut Arena::new(), &mut aovs, &mut ()).1
 }
 
-struct Run<'r, 'a> {
+/// A run over the context's film.
+pub(super) struct Run<'r, 'a> {
     cx: &'r RenderContext<'a>,
-    estimator: &'r dyn RadianceEstimator,
     points: Option<&'r dyn PointSet>,
     reference: Option<ReferenceOrder>,
+    tiles: Vec<Window>,
+    /// Samples per pixel of the whole run.
+    asked: u32,
     taken: AtomicU64,
 }
 
 /// What a tile gives back.
-struct TileResult {
+struct TileResult<N> {
     store: TileStore,
+    notes: N,
     samples: u64,
     rays: u64,
     bad: BadSamples,
     complete: bool,
 }
 
-impl Run<'_, '_> {
-    fn passes(&self, asked: u32) -> Result<(Report, super::FilmStore), RenderError> {
+impl<'r, 'a> Run<'r, 'a> {
+    pub(super) fn new(cx: &'r RenderContext<'a>, points: Option<&'r dyn PointSet>, asked: u32) -> Self {
+        let (reference, taken) = (cx.reference_order(), AtomicU64::new(0));
+        let mut run = Run { cx, points, reference, tiles: Vec::new(), asked, taken };
+        run.tiles = run.cut();
+        run
+    }
+
+    fn passes(&self, tracer: &impl Tracer) -> Result<(Report, FilmStore), RenderError> {
         let cx = self.cx;
-        let tiles = self.tiles();
         let mut store = cx.store.clone();
         let mut report = Report::default();
         let in_one_pass = matches!(cx.order, SampleOrder::Reference { .. });
         for pass in 0.. {
             let (start, end) = match in_one_pass {
-                true => (report.spp, asked),
+                true => (report.spp, self.asked),
                 false => Schedule::pass(pass),
             };
-            let end = end.min(asked);
+            let end = end.min(self.asked);
             if start >= end || (pass > 0 && cx.control.should_stop()) {
                 break;
             }
             // A pass that is cut short is lost, so that the picture is that of so many samples; but for the first one.
             let before = (report.spp > 0).then(|| store.clone());
-            let mut complete = true;
-            for batch in tiles.chunks(BATCH) {
-                let results: Vec<TileResult> = batch
-                    .par_iter()
-                    .map(|tile| {
-                        let result = self.tile(*tile, start, end, report.spp);
-                        let taken = self.taken.fetch_add(result.samples, Ordering::Relaxed) + result.samples;
-                        self.tell_progress(taken, asked, report.spp);
-                        result
-                    })
-                    .collect();
-                for result in results {
-                    store.add_tile(&result.store);
-                    report.samples += result.samples;
-                    report.rays += result.rays;
-                    report.bad.append(result.bad);
-                    complete &= result.complete;
-                }
-            }
-            if !complete {
+            if !self.pass(tracer, (start, end), BATCH, &mut store, &mut report, |_| ()) {
                 store = before.unwrap_or(store);
                 break;
             }
@@ -117,13 +169,54 @@ impl Run<'_, '_> {
                 break;
             }
         }
-        report.stopped = report.spp < asked && matches!(cx.budget, Budget::Samples(_));
-        report.seconds = cx.control.seconds();
+        self.conclude(&mut report);
         Ok((report, store))
     }
 
+    /// Writes the end of the run into the report.
+    pub(super) fn conclude(&self, report: &mut Report) {
+        report.stopped = report.spp < self.asked && matches!(self.cx.budget, Budget::Samples(_));
+        report.seconds = self.cx.control.seconds();
+    }
+
+    /// Takes samples `start..end` of all pixels into the film. What tiles note is handed over in their order, `batch`
+    /// tiles at a time. Whether the pass is complete.
+    pub(super) fn pass<T: Tracer>(
+        &self,
+        tracer: &T,
+        (start, end): (u32, u32),
+        batch: usize,
+        store: &mut FilmStore,
+        report: &mut Report,
+        mut hand_over: impl FnMut(Vec<T::Notes>),
+    ) -> bool {
+        let mut complete = true;
+        for batch in self.tiles.chunks(batch) {
+            let results: Vec<TileResult<T::Notes>> = batch
+                .par_iter()
+                .map(|tile| {
+                    let result = self.tile(tracer, *tile, start, end, report.spp);
+                    let taken = self.taken.fetch_add(result.samples, Ordering::Relaxed) + result.samples;
+                    self.tell_progress(taken, report.spp);
+                    result
+                })
+                .collect();
+            let mut notes = Vec::with_capacity(results.len());
+            for result in results {
+                store.add_tile(&result.store);
+                report.samples += result.samples;
+                report.rays += result.rays;
+                report.bad.append(result.bad);
+                complete &= result.complete;
+                notes.push(result.notes);
+            }
+            hand_over(notes);
+        }
+        complete
+    }
+
     /// The sampled window cut into tiles, relative to the crop window.
-    fn tiles(&self) -> Vec<Window> {
+    fn cut(&self) -> Vec<Window> {
         let border = self.cx.border();
         let size = self.cx.film.crop_size + 2 * border;
         let mut tiles = Vec::new();
@@ -137,9 +230,9 @@ impl Run<'_, '_> {
         tiles
     }
 
-    fn tell_progress(&self, taken: u64, asked: u32, spp: u32) {
+    fn tell_progress(&self, taken: u64, spp: u32) {
         let size = self.cx.film.crop_size + 2 * self.cx.border();
-        let total = f64::from(size.x) * f64::from(size.y) * f64::from(asked);
+        let total = f64::from(size.x) * f64::from(size.y) * f64::from(self.asked);
         let fraction = match (self.cx.budget, self.cx.control.time_fraction()) {
             (Budget::Seconds(_), Some(fraction)) => fraction,
             _ => taken as f64 / total,
@@ -147,10 +240,18 @@ impl Run<'_, '_> {
         self.cx.control.progress(Progress { fraction, samples: taken, spp });
     }
 
-    fn tile(&self, tile: Window, start: u32, end: u32, complete_spp: u32) -> TileResult {
+    fn tile<T: Tracer>(
+        &self,
+        tracer: &T,
+        tile: Window,
+        start: u32,
+        end: u32,
+        complete_spp: u32,
+    ) -> TileResult<T::Notes> {
         let cx = self.cx;
         let mut result = TileResult {
             store: TileStore::new(tile, &*cx.film.filter, cx.store.aovs().len()),
+            notes: tracer.notes(),
             samples: 0,
             rays: 0,
             bad: BadSamples::default(),
@@ -177,11 +278,12 @@ impl Run<'_, '_> {
                 });
                 for sample in start..end {
                     aovs.fill(0.0);
+                    let notes = &mut result.notes;
                     let (offset, value) = match &mut shared {
-                        Some(shared) => sample_pixel(cx, self.estimator, pixel, shared, &mut arena, &mut aovs),
+                        Some(shared) => sample_pixel(cx, tracer, pixel, shared, &mut arena, &mut aovs, notes),
                         None => {
                             let mut own = stream(self.points, cx.seed, key, sample);
-                            sample_pixel(cx, self.estimator, pixel, &mut own, &mut arena, &mut aovs)
+                            sample_pixel(cx, tracer, pixel, &mut own, &mut arena, &mut aovs, notes)
                         }
                     };
                     arena.reset();
@@ -190,6 +292,7 @@ impl Run<'_, '_> {
                     if usable(value, &aovs) {
                         let position = inside.as_vec2() + offset;
                         result.store.splat(&*cx.film.filter, inside, position, value, &aovs);
+                        tracer.taken(&mut result.notes, inside, value);
                     } else {
                         let value = value.rgb.to_array();
                         result.bad.add(BadSample { pixel: pixel.max(IVec2::ZERO).as_uvec2(), sample, value });
@@ -210,13 +313,14 @@ fn usable(value: Radiance, aovs: &[f32]) -> bool {
 
 /// Takes one sample of a pixel of the full film: where in the pixel, and what was found.
 #[inline]
-fn sample_pixel(
+fn sample_pixel<T: Tracer>(
     cx: &RenderContext<'_>,
-    estimator: &dyn RadianceEstimator,
+    tracer: &T,
     pixel: IVec2,
     stream: &mut Stream<'_>,
     arena: &mut Arena,
     aovs: &mut [f32],
+    notes: &mut T::Notes,
 ) -> (Vec2, Radiance) {
     let offset = stream.next_2d();
     let film = (pixel.as_vec2() + offset) / cx.film.size.as_vec2();
@@ -226,12 +330,12 @@ fn sample_pixel(
         stream.next_1d();
     }
     let mut camera = cx.sensor.ray(film, lens);
-    if estimator.wants_differentials() {
+    if tracer.wants_differentials() {
         let step = cx.differential_step();
         let beside = |offset: Vec2| cx.sensor.ray(film + offset, lens).ray;
         camera.offsets = Some([beside(Vec2::new(step.x, 0.0)), beside(Vec2::new(0.0, step.y))]);
     }
-    let mut value = estimator.radiance(cx.scene, &camera, stream, arena, aovs);
+    let mut value = tracer.radiance(cx.scene, &camera, stream, arena, aovs, notes);
     value.rgb *= camera.weight;
     (offset, value)
 }

@@ -1,6 +1,8 @@
 //! A built object of any kind.
 
-use crate::interfaces::{Bsdf, Emitter, Film, Integrator, LightSampler, Rfilter, Sampler, Sensor, Shape, Texture};
+use crate::interfaces::{
+    Bsdf, Emitter, Film, Guide, Integrator, LightSampler, Rfilter, Sampler, Sensor, Shape, Texture,
+};
 use std::sync::Arc;
 
 /// A shape with what the scene hangs on it.
@@ -39,4 +41,5 @@ pub enum Object {
     LightSampler(Arc<dyn LightSampler>),
     Bsdf(Arc<dyn Bsdf>),
     Texture(Arc<dyn Texture>),
+    Guide(Arc<dyn Guide>),
 }

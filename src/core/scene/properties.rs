@@ -13,7 +13,7 @@ use super::param::{Default, Param, ParamType, Slot};
 use super::registry::{Failed, Plugin};
 use crate::color::{Rgb, ior, spectrum};
 use crate::interfaces::{
-    Bsdf, ColorSource, Film, Integrator, LightSampler, Rfilter, Sampler, ScalarSource, Shape, Texture,
+    Bsdf, ColorSource, Film, Guide, Integrator, LightSampler, Rfilter, Sampler, ScalarSource, Shape, Texture,
 };
 use crate::math::{Transform, Vec3};
 use glam::DMat4;
@@ -381,6 +381,11 @@ impl<'a> Properties<'a> {
     /// The nested reconstruction filter.
     pub fn rfilter(&self) -> Option<Arc<dyn Rfilter>> {
         self.of_kind(|o| if let Object::Rfilter(x) = o { Some(x.clone()) } else { None }).pop()
+    }
+
+    /// The nested guide.
+    pub fn guide(&self) -> Option<Arc<dyn Guide>> {
+        self.of_kind(|o| if let Object::Guide(x) = o { Some(x.clone()) } else { None }).pop()
     }
 
     /// The nested film.

@@ -6,7 +6,9 @@
 use super::description::ObjectKind;
 use super::param::Param;
 use super::properties::Properties;
-use crate::interfaces::{Bsdf, Emitter, Film, Integrator, LightSampler, Rfilter, Sampler, Sensor, Shape, Texture};
+use crate::interfaces::{
+    Bsdf, Emitter, Film, Guide, Integrator, LightSampler, Rfilter, Sampler, Sensor, Shape, Texture,
+};
 use std::sync::Arc;
 
 /// Returned by a constructor that could not go on. What was wrong has been told to [`Properties`].
@@ -30,6 +32,7 @@ pub enum Constructor {
     Bsdf(fn(&Properties<'_>) -> Built<dyn Bsdf>),
     LightSampler(fn(&Properties<'_>) -> Built<dyn LightSampler>),
     Texture(fn(&Properties<'_>) -> Built<dyn Texture>),
+    Guide(fn(&Properties<'_>) -> Built<dyn Guide>),
 }
 
 impl Constructor {
@@ -46,6 +49,7 @@ impl Constructor {
             Constructor::Bsdf(_) => ObjectKind::Bsdf,
             Constructor::LightSampler(_) => ObjectKind::LightSampler,
             Constructor::Texture(_) => ObjectKind::Texture,
+            Constructor::Guide(_) => ObjectKind::Guide,
         }
     }
 }

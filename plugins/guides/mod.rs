@@ -1,0 +1,8 @@
+//! All guides: one file or folder each, one line each in [`PLUGINS`].
+
+mod sd_tree;
+
+use lucerna_core::scene::Plugin;
+
+/// The table of all guides.
+pub const PLUGINS: &[Plugin] = &[sd_tree::PLUGIN];

@@ -1,0 +1,169 @@
+//! What has been learnt, to be sampled.
+
+use super::cylinder;
+use super::quadtree::{CELLS, EDGE, Quadtree, UNIFORM};
+use super::spatial::SpatialTree;
+use lucerna_core::interfaces::{Arena, GuideField, GuidedDirections, SurfaceHit};
+use lucerna_core::math::{Vec2, Vec3};
+use std::sync::{Arc, LazyLock};
+
+/// A field.
+pub struct Field {
+    pub tree: SpatialTree,
+    pub leaves: Vec<Leaf>,
+    /// Whether directions are weighted by the cosine at the vertex.
+    pub cosine: bool,
+}
+
+/// What is known in a cell of space.
+#[derive(Clone, Default)]
+pub struct Leaf {
+    /// Nothing where no light has arrived yet. Cells that were one share it.
+    pub directions: Option<Arc<Quadtree>>,
+    /// Probability of the guide.
+    pub p_guide: f32,
+    /// Mean radiance times 4π that arrived.
+    pub fluence: f32,
+}
+
+impl GuideField for Field {
+    fn at<'g>(&'g self, hit: &SurfaceHit, one_sided: bool, arena: &'g Arena) -> Option<&'g dyn GuidedDirections> {
+        let leaf = &self.leaves[self.tree.leaf(self.tree.cell(hit.p)).0 as usize];
+        let tree = leaf.directions.as_deref()?;
+        let normal = hit.frame.n * 1f32.copysign(hit.wi.z);
+        let cosines = (self.cosine && one_sided).then(|| cosines(normal));
+        Some(arena.alloc(Here::new(tree, leaf.p_guide, cosines)?))
+    }
+
+    fn incident(&self, p: Vec3, d: Vec3) -> Option<f32> {
+        let leaf = &self.leaves[self.tree.leaf(self.tree.cell(p)).0 as usize];
+        let tree = leaf.directions.as_deref()?;
+        let (cell, density) = tree.pdf_in_cell(cylinder::of_direction(d));
+        Some(leaf.fluence * UNIFORM * tree.grid[cell] * CELLS as f32 * density)
+    }
+
+    fn validate(&self) -> Result<(), String> {
+        self.tree.validate()?;
+        if self.leaves.len() != self.tree.leaves() {
+            return Err("the field does not have as many leaves as its tree".to_owned());
+        }
+        for leaf in &self.leaves {
+            if !(0.0..=1.0).contains(&leaf.p_guide) || !(0.0..f32::INFINITY).contains(&leaf.fluence) {
+                return Err("a leaf has no usable probability or fluence".to_owned());
+            }
+            leaf.directions.iter().try_for_each(|tree| tree.validate())?;
+        }
+        Ok(())
+    }
+}
+
+/// A leaf's directions at a vertex.
+struct Here<'g> {
+    tree: &'g Quadtree,
+    p_guide: f32,
+    /// Weights of the grid's cells.
+    weights: [f32; CELLS],
+    /// Sums of its rows.
+    rows: [f32; EDGE],
+    /// One over the sum of all.
+    scale: f32,
+}
+
+impl<'g> Here<'g> {
+    /// `None` if no light comes from where it would be scattered.
+    #[inline]
+    fn new(tree: &'g Quadtree, p_guide: f32, cosines: Option<&[f32; CELLS]>) -> Option<Self> {
+        let mut weights = tree.grid;
+        if let Some(cosines) = cosines {
+            weights.iter_mut().zip(cosines).for_each(|(weight, cosine)| *weight *= cosine);
+        }
+        let mut rows = [0.0; EDGE];
+        for (row, cells) in rows.iter_mut().zip(weights.as_chunks::<EDGE>().0) {
+            *row = sum(cells);
+        }
+        let total = sum(&rows);
+        let scale = 1.0 / total;
+        (total > 0.0 && scale.is_finite()).then_some(Here { tree, p_guide, weights, rows, scale })
+    }
+}
+
+/// The sum of eight numbers, always in the same order.
+#[inline]
+fn sum([a, b, c, d, e, f, g, h]: &[f32; EDGE]) -> f32 {
+    ((a + e) + (c + g)) + ((b + f) + (d + h))
+}
+
+impl GuidedDirections for Here<'_> {
+    fn p_guide(&self) -> f32 {
+        self.p_guide
+    }
+
+    fn sample(&self, u2: Vec2) -> (Vec3, f32) {
+        let (row, y) = pick(&self.rows, f64::from(u2.y));
+        let (column, x) = pick(&self.weights.as_chunks::<EDGE>().0[row], f64::from(u2.x));
+        let cell = EDGE * row + column;
+        let (p, density) = self.tree.sample_in_cell(cell, [x, y]);
+        let relative = self.weights[cell] * self.scale * CELLS as f32;
+        (cylinder::to_direction(p), UNIFORM * relative * density)
+    }
+
+    fn pdf(&self, d: Vec3) -> f32 {
+        let (cell, density) = self.tree.pdf_in_cell(cylinder::of_direction(d));
+        UNIFORM * self.weights[cell] * self.scale * CELLS as f32 * density
+    }
+}
+
+/// An index by weight, and what is left of the number. Never one without weight, if there is any.
+#[inline]
+fn pick(weights: &[f32; EDGE], u: f64) -> (usize, f64) {
+    let total: f64 = weights.iter().map(|w| f64::from(*w)).sum();
+    let (mut low, target, mut last) = (0.0, u * total, (0, 0.0));
+    for (i, weight) in weights.iter().enumerate() {
+        let weight = f64::from(*weight);
+        if weight > 0.0 {
+            let rest = (target - low) / weight;
+            if rest < 1.0 {
+                return (i, rest.max(0.0));
+            }
+            last = (i, 1.0 - f64::EPSILON);
+        }
+        low += weight;
+    }
+    last
+}
+
+/// Normals are taken together in so many groups along each edge of the cylinder's square.
+const GROUPS: usize = 16;
+
+/// Mean cosine of each cell of the grid with a normal, for directions above the surface. It is averaged over the group of
+/// the normal too, so that no cell that could be seen has none.
+fn cosines(n: Vec3) -> &'static [f32; CELLS] {
+    static TABLE: LazyLock<Vec<[f32; CELLS]>> = LazyLock::new(|| {
+        /// Points along an edge of a cell.
+        const POINTS: usize = 4;
+        let points = |cells: usize| {
+            let step = 1.0 / (cells * POINTS) as f32;
+            move |cell: usize| {
+                let (i, j) = (cell % cells, cell / cells);
+                (0..POINTS * POINTS).map(move |k| {
+                    let (x, y) = (i * POINTS + k % POINTS, j * POINTS + k / POINTS);
+                    cylinder::to_direction(Vec2::new((x as f32 + 0.5) * step, (y as f32 + 0.5) * step))
+                })
+            }
+        };
+        let (normals, directions) = (points(GROUPS), points(EDGE));
+        let cells: Vec<Vec<Vec3>> = (0..CELLS).map(|cell| directions(cell).collect()).collect();
+        let group = |group: usize| {
+            let normals: Vec<Vec3> = normals(group).collect();
+            let mut row = [0.0; CELLS];
+            for (mean, directions) in row.iter_mut().zip(&cells) {
+                let pairs = normals.iter().flat_map(|n| directions.iter().map(move |d| n.dot(*d).max(0.0)));
+                *mean = pairs.sum::<f32>() / (normals.len() * directions.len()) as f32;
+            }
+            row
+        };
+        (0..GROUPS * GROUPS).map(group).collect()
+    });
+    let p = cylinder::of_direction(n) * GROUPS as f32;
+    &TABLE[(p.y as usize).min(GROUPS - 1) * GROUPS + (p.x as usize).min(GROUPS - 1)]
+}

@@ -1,0 +1,256 @@
+//! Fills the tree with what paths found, and refines it between iterations.
+
+use super::cylinder;
+use super::field::{Field, Leaf};
+use super::mixing::Mixing;
+use super::quadtree::{Quadtree, Refinement, Sums};
+use super::spatial::SpatialTree;
+use super::{DirectionalFilter, Settings, SpatialFilter};
+use lucerna_core::interfaces::{GuideField, GuideLearner, GuideRecord, mix};
+use lucerna_core::math::Aabb;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// Nodes above the limit of memory: the threshold of quadtrees is doubled so often at most.
+const MOST_COARSENINGS: u32 = 10;
+
+/// The tree that is filled.
+pub struct Learner {
+    settings: Settings,
+    tree: SpatialTree,
+    cells: Vec<Cell>,
+    field: Arc<Field>,
+    /// Records taken in, over all iterations: what their random numbers depend on.
+    taken: u64,
+    /// Records of this iteration.
+    records: u64,
+    iterations: u32,
+    /// The limit of memory was reached.
+    full: bool,
+}
+
+/// A cell of space that is filled.
+#[derive(Clone, Default)]
+struct Cell {
+    sums: Sums,
+    /// Records, each counted by the part of it that lies here.
+    count: f64,
+    mixing: Mixing,
+    /// What was learnt before.
+    directions: Option<Arc<Quadtree>>,
+    fluence: f32,
+}
+
+/// A record's part in a cell: which cell, tile and record, and how much of it.
+#[derive(Clone, Copy)]
+struct Part {
+    cell: u32,
+    tile: u32,
+    record: u32,
+    share: f32,
+}
+
+impl Learner {
+    pub fn new(settings: Settings, bounds: Aabb) -> Self {
+        let tree = SpatialTree::new(bounds);
+        let field = Arc::new(Field { tree: tree.clone(), leaves: vec![Leaf::default()], cosine: settings.cosine });
+        let cells = vec![Cell::default()];
+        Learner { settings, tree, cells, field, taken: 0, records: 0, iterations: 0, full: false }
+    }
+
+    /// Where the record goes, with the part of it in each cell.
+    fn place(&self, record: &GuideRecord, number: u64, mut put: impl FnMut(u32, f32)) {
+        const EDGE: u32 = 1 << 20;
+        let cell = self.tree.cell(record.p);
+        let (leaf, depth) = self.tree.leaf(cell);
+        if self.settings.spatial_filter == SpatialFilter::Nearest || depth == 0 {
+            return put(leaf, 1.0);
+        }
+        // A box as large as the leaf with the point in its middle, moved into the cube.
+        let size = SpatialTree::extent(depth);
+        let low = [0, 1, 2].map(|axis: usize| cell[axis].saturating_sub(size[axis] / 2).min(EDGE - size[axis]));
+        if self.settings.spatial_filter == SpatialFilter::Box {
+            return self.tree.overlaps(low, size, put);
+        }
+        let random = mix(number);
+        let jittered = [0, 1, 2].map(|axis: usize| {
+            let u = random >> (21 * axis) & 0xf_ffff;
+            low[axis] + ((u * u64::from(size[axis])) >> 20) as u32
+        });
+        put(self.tree.leaf(jittered).0, 1.0);
+    }
+
+    /// All parts of all records, ordered by cell, then by tile and record.
+    fn parts(&self, tiles: &[Vec<GuideRecord>]) -> Vec<Part> {
+        let numbered = tiles.iter().scan(self.taken, |next, tile| {
+            let first = *next;
+            *next += tile.len() as u64;
+            Some(first)
+        });
+        let firsts: Vec<u64> = numbered.collect();
+        let placed: Vec<Vec<Part>> = tiles
+            .par_iter()
+            .enumerate()
+            .map(|(tile, records)| {
+                let mut parts = Vec::with_capacity(records.len());
+                for (index, record) in records.iter().enumerate() {
+                    let (tile, number) = (tile as u32, firsts[tile] + index as u64);
+                    let record_index = index as u32;
+                    self.place(record, number, |cell, share| {
+                        parts.push(Part { cell, tile, record: record_index, share })
+                    });
+                }
+                parts
+            })
+            .collect();
+        // Counted, then moved to their places: the order of the records of a cell stays.
+        let mut next = vec![0; self.cells.len()];
+        placed.iter().flatten().for_each(|part| next[part.cell as usize] += 1);
+        let mut sum = 0;
+        next.iter_mut().for_each(|count| sum += std::mem::replace(count, sum));
+        let mut sorted = vec![Part { cell: 0, tile: 0, record: 0, share: 0.0 }; sum];
+        for part in placed.iter().flatten() {
+            let place = &mut next[part.cell as usize];
+            sorted[*place] = *part;
+            *place += 1;
+        }
+        sorted
+    }
+
+    /// Bytes of everything.
+    fn bytes(&self) -> usize {
+        let tree = |cell: &Cell| cell.directions.as_ref().map_or(0, |tree| tree.bytes());
+        let cells =
+            self.cells.iter().map(|cell| size_of::<Cell>() + size_of::<Leaf>() + cell.sums.bytes() + tree(cell));
+        2 * self.tree.bytes() + cells.sum::<usize>()
+    }
+
+    /// Divides cells of space which got many records. Both halves go on with what is known in the whole.
+    fn split(&mut self, spp: u32) {
+        let most = self.settings.spatial_threshold * f64::from(spp).sqrt();
+        let mut left = self.settings.max_bytes.saturating_sub(self.bytes());
+        let mut full = false;
+        let cells = std::cell::RefCell::new(&mut self.cells);
+        let wanted = |leaf: u32, _| {
+            let cell = &cells.borrow()[leaf as usize];
+            let needed = size_of::<Cell>() + size_of::<Leaf>() + cell.sums.bytes() + 2 * size_of::<[u32; 2]>();
+            let divide = cell.count > most;
+            full |= divide && needed > left;
+            left = if divide { left.saturating_sub(needed) } else { left };
+            divide && left > 0
+        };
+        self.tree.split(wanted, |old, _| {
+            let mut cells = cells.borrow_mut();
+            cells[old as usize].count *= 0.5;
+            let half = cells[old as usize].clone();
+            cells.push(half);
+        });
+        self.full |= full;
+    }
+
+    /// Empties the sums; their trees follow the flux that was found.
+    fn empty(&mut self) {
+        let mut how = Refinement { threshold: self.settings.directional_threshold, depth: self.settings.depth };
+        let old: Vec<Sums> = self.cells.iter_mut().map(|cell| std::mem::take(&mut cell.sums)).collect();
+        for _ in 0..MOST_COARSENINGS {
+            self.cells.par_iter_mut().zip(&old).for_each(|(cell, old)| cell.sums = old.refined(how));
+            if self.bytes() <= self.settings.max_bytes {
+                return;
+            }
+            self.full = true;
+            how.threshold *= 2.0;
+        }
+        self.cells.iter_mut().for_each(|cell| cell.sums = Sums::default());
+    }
+}
+
+impl GuideLearner for Learner {
+    fn learn(&mut self, tiles: &[Vec<GuideRecord>]) {
+        let parts = self.parts(tiles);
+        let by_cell: Vec<&[Part]> = parts.chunk_by(|a, b| a.cell == b.cell).collect();
+        let mut filled: Vec<(&mut Cell, &[Part])> = Vec::with_capacity(by_cell.len());
+        let mut rest = &mut self.cells[..];
+        let mut passed = 0;
+        for parts in by_cell {
+            let (_, from) = std::mem::take(&mut rest).split_at_mut(parts[0].cell as usize - passed);
+            let Some((cell, after)) = from.split_first_mut() else { break };
+            (rest, passed) = (after, parts[0].cell as usize + 1);
+            filled.push((cell, parts));
+        }
+        let (filter, learns_mixing) = (self.settings.directional_filter, self.settings.p_guide.is_none());
+        filled.into_par_iter().for_each(|(cell, parts)| {
+            for part in parts {
+                let record = &tiles[part.tile as usize][part.record as usize];
+                cell.take(record, f64::from(part.share), filter);
+                if learns_mixing {
+                    cell.mixing.step(record);
+                }
+            }
+        });
+        let count = tiles.iter().map(|tile| tile.len() as u64).sum::<u64>();
+        self.taken += count;
+        self.records += count;
+    }
+
+    fn refine(&mut self, spp: u32) {
+        let p_guide = self.settings.p_guide;
+        self.cells.par_iter_mut().for_each(|cell| {
+            if let Some(tree) = Quadtree::new(&cell.sums) {
+                cell.fluence = (cell.sums.total() / cell.count.max(1.0)) as f32;
+                cell.directions = Some(Arc::new(tree));
+            }
+        });
+        self.split(spp);
+        self.empty();
+        self.cells.iter_mut().for_each(|cell| cell.count = 0.0);
+        let leaf = |cell: &Cell| Leaf {
+            directions: cell.directions.clone(),
+            p_guide: p_guide.unwrap_or_else(|| cell.mixing.p_guide()),
+            fluence: cell.fluence,
+        };
+        let leaves = self.cells.iter().map(leaf).collect();
+        self.field = Arc::new(Field { tree: self.tree.clone(), leaves, cosine: self.settings.cosine });
+        self.records = 0;
+        self.iterations += 1;
+    }
+
+    fn field(&self) -> Arc<dyn GuideField> {
+        self.field.clone()
+    }
+
+    fn summary(&self) -> Vec<String> {
+        let mib = self.bytes() as f64 / f64::from(1 << 20);
+        let leaves = &self.field.leaves;
+        let nodes: usize = leaves.iter().filter_map(|leaf| leaf.directions.as_ref()).map(|tree| tree.nodes()).sum();
+        let count = leaves.len() as f64;
+        let p_guide = leaves.iter().map(|leaf| f64::from(leaf.p_guide)).sum::<f64>() / count;
+        let mut lines = vec![format!(
+            "sd_tree: {} iterations, {} cells of space (depth {}), {:.0} nodes each, mean probability of the guide {p_guide:.2}, {mib:.1} MiB",
+            self.iterations,
+            leaves.len(),
+            self.tree.depth(),
+            nodes as f64 / count,
+        )];
+        if self.full {
+            lines.push("sd_tree: the limit of memory was reached, the tree is coarser than it should be".to_owned());
+        }
+        lines
+    }
+}
+
+impl Cell {
+    /// Takes a part of a record in.
+    #[inline]
+    fn take(&mut self, record: &GuideRecord, share: f64, filter: DirectionalFilter) {
+        self.count += share;
+        let flux = share * f64::from(record.radiance) / f64::from(record.pdf);
+        if !(flux > 0.0 && flux.is_finite()) {
+            return;
+        }
+        let p = cylinder::of_direction(record.d);
+        match filter {
+            DirectionalFilter::Nearest => self.sums.add(p, flux),
+            DirectionalFilter::Box => self.sums.add_box(p, flux),
+        }
+    }
+}

@@ -1,0 +1,153 @@
+//! How often a direction comes from the guide: learnt by following the gradient of the divergence between what is
+//! sampled and what would be ideal (Müller 2019, section 10.5).
+
+use lucerna_core::interfaces::{GuideRecord, RecordKind};
+
+/// Parameters of the descent: Kingma and Ba 2015; rate and regularisation from Müller 2019, algorithm 3.
+const RATE: f32 = 0.01;
+const BETA_1: f32 = 0.9;
+const BETA_2: f32 = 0.999;
+const EPSILON: f32 = 1e-8;
+const REGULARISATION: f32 = 0.01;
+
+/// The latent variable stays within this: probabilities from 4e-4.
+const MOST: f32 = 8.0;
+
+/// A learnt probability stays within these, so that neither way of sampling is given up.
+pub const LIMITS: (f32, f32) = (0.05, 0.95);
+
+/// The state of the descent in one leaf.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Mixing {
+    /// The probability of the BSDF is the logistic function of it.
+    theta: f32,
+    /// First and second moment of the gradient.
+    m: f32,
+    v: f32,
+    /// The decay of both since the first step.
+    decay_1: f32,
+    decay_2: f32,
+    steps: u32,
+    /// Sum and number of the radiance scattered: gradients are measured by its mean. The text leaves them as they are,
+    /// since the descent does not depend on their size; but the regularisation, which is added to them, then does.
+    sum: f64,
+    count: f64,
+}
+
+impl Mixing {
+    /// Probability of the guide.
+    pub fn p_guide(&self) -> f32 {
+        (1.0 - self.p_bsdf()).clamp(LIMITS.0, LIMITS.1)
+    }
+
+    fn p_bsdf(&self) -> f32 {
+        1.0 / (1.0 + (-self.theta).exp())
+    }
+
+    /// Takes in a record.
+    pub fn step(&mut self, record: &GuideRecord) {
+        let GuideRecord { scattered, pdf_bsdf, pdf_guide, kind, .. } = *record;
+        if kind == RecordKind::Unguided {
+            return;
+        }
+        self.sum += f64::from(scattered);
+        self.count += 1.0;
+        if scattered <= 0.0 {
+            return;
+        }
+        let p = self.p_bsdf();
+        let share = match kind {
+            // The guide has no part in a delta lobe.
+            RecordKind::Delta => 1.0 / p,
+            _ => (pdf_bsdf - pdf_guide) / (p * pdf_bsdf + (1.0 - p) * pdf_guide),
+        };
+        let product = (f64::from(scattered) / (self.sum / self.count)) as f32;
+        let gradient = -product * share * p * (1.0 - p) + REGULARISATION * self.theta;
+        if gradient.is_finite() {
+            self.descend(gradient);
+        }
+    }
+
+    fn descend(&mut self, gradient: f32) {
+        if self.steps == 0 {
+            (self.decay_1, self.decay_2) = (1.0, 1.0);
+        }
+        self.steps += 1;
+        self.decay_1 *= BETA_1;
+        self.decay_2 *= BETA_2;
+        self.m = BETA_1 * self.m + (1.0 - BETA_1) * gradient;
+        self.v = BETA_2 * self.v + (1.0 - BETA_2) * gradient * gradient;
+        let rate = RATE * (1.0 - self.decay_2).sqrt() / (1.0 - self.decay_1);
+        self.theta = (self.theta - rate * self.m / (self.v.sqrt() + EPSILON)).clamp(-MOST, MOST);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lucerna_core::math::Vec3;
+    use lucerna_core::sampling::Pcg32;
+
+    /// Light from one half of the directions, `inside` of it in a part where the guide has all its density; the ideal
+    /// probability is known in closed form. Directions are in [0, 1): the BSDF is uniform, the guide is uniform on the
+    /// first tenth.
+    fn learn(inside: f32, scale: f32, steps: u32) -> f32 {
+        let (mut mixing, mut pcg) = (Mixing::default(), Pcg32::new(7, 7));
+        for _ in 0..steps {
+            let p = mixing.p_guide();
+            let (choice, u) = (pcg.next_f32(), pcg.next_f32());
+            let x = if choice < p { 0.1 * u } else { u };
+            let pdf_guide = if x < 0.1 { 10.0 } else { 0.0 };
+            let pdf = p * pdf_guide + (1.0 - p);
+            let value = scale * if x < 0.1 { 10.0 * inside } else { (1.0 - inside) / 0.9 };
+            let (radiance, scattered, kind) = (value, value / pdf, RecordKind::Mixed);
+            mixing.step(&GuideRecord {
+                p: Vec3::ZERO,
+                d: Vec3::Z,
+                radiance,
+                scattered,
+                pdf,
+                pdf_bsdf: 1.0,
+                pdf_guide,
+                kind,
+            });
+        }
+        mixing.p_guide()
+    }
+
+    /// The mixture can be what is ideal: then p + (1 − p)/10 of the samples are inside.
+    #[test]
+    fn the_ideal_probability_is_found_at_any_scale() {
+        for ideal in [0.2_f32, 0.5, 0.8] {
+            let inside = ideal + 0.1 * (1.0 - ideal);
+            for scale in [1e-12, 1e-4, 1.0, 1e8] {
+                let found = learn(inside, scale, 20_000);
+                assert!((found - ideal).abs() < 0.08, "{ideal} at {scale}: {found}");
+            }
+        }
+    }
+
+    #[test]
+    fn hc_p07_delta_lobes_draw_towards_the_bsdf_but_not_all_the_way() {
+        let mut mixing = Mixing::default();
+        let record = GuideRecord {
+            p: Vec3::ZERO,
+            d: Vec3::Z,
+            radiance: 1.0,
+            scattered: 1.0,
+            pdf: 0.5,
+            pdf_bsdf: 1.0,
+            pdf_guide: 0.0,
+            kind: RecordKind::Delta,
+        };
+        for _ in 0..10_000 {
+            mixing.step(&record);
+        }
+        assert!(mixing.p_guide() < 0.1 && mixing.p_guide() >= LIMITS.0);
+        for scattered in [f32::MAX, 1e-38, 0.0] {
+            mixing.step(&GuideRecord { scattered, pdf_bsdf: 0.0, ..record });
+            mixing.step(&GuideRecord { scattered, pdf_bsdf: 0.0, kind: RecordKind::Mixed, ..record });
+            assert!(mixing.theta.is_finite() && (LIMITS.0..=LIMITS.1).contains(&mixing.p_guide()));
+        }
+    }
+}

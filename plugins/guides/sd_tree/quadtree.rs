@@ -1,0 +1,431 @@
+//! Directions in a quadtree over the [cylinder](super::cylinder)'s square: one that is filled, and one to sample from.
+//!
+//! The upper three levels are a grid of 8 × 8 that every tree has: it is sampled like a table, and may be weighted by the
+//! cosine at a vertex. Each of its cells is a leaf or the root of a quadtree.
+
+use lucerna_core::math::{ONE_MINUS_EPSILON, Vec2};
+use std::collections::VecDeque;
+use std::f32::consts::PI;
+
+/// Cells of the grid along an edge.
+pub const EDGE: usize = 8;
+/// Cells of the grid.
+pub const CELLS: usize = EDGE * EDGE;
+/// Level of the grid's cells.
+const GRID_LEVEL: u32 = 3;
+
+/// Nodes of a tree at most, for they are numbered with 16 bits and 0 means none.
+const MOST_NODES: usize = u16::MAX as usize;
+
+/// Density per solid angle of a uniform direction.
+pub const UNIFORM: f32 = 0.25 / PI;
+
+/// A node of either tree: values of four children, and their nodes (0: a leaf). Child `2 j + i` is right for odd `i`
+/// (u above one half), upper for odd `j`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Node<T> {
+    value: [T; 4],
+    child: [u16; 4],
+}
+
+/// The child in which a point lies, which becomes a point of that child.
+#[inline]
+fn descend(p: &mut Vec2) -> usize {
+    *p *= 2.0;
+    let (i, j) = (usize::from(p.x >= 1.0), usize::from(p.y >= 1.0));
+    *p -= Vec2::new(i as f32, j as f32);
+    2 * j + i
+}
+
+/// The cell of the grid in which a point lies, which becomes a point of that cell. Cells are numbered along u.
+#[inline]
+fn cell(p: &mut Vec2) -> usize {
+    *p *= EDGE as f32;
+    let (i, j) = ((p.x as usize).min(EDGE - 1), (p.y as usize).min(EDGE - 1));
+    *p -= Vec2::new(i as f32, j as f32);
+    j * EDGE + i
+}
+
+/// A tree that is filled. Only leaves are added to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sums {
+    grid: [f64; CELLS],
+    roots: [u16; CELLS],
+    /// The first one is not used.
+    nodes: Vec<Node<f64>>,
+}
+
+/// How a tree is refined.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Refinement {
+    /// A cell with more than this part of the flux is divided.
+    pub threshold: f64,
+    /// Levels below the square at most.
+    pub depth: u32,
+}
+
+impl Default for Sums {
+    fn default() -> Self {
+        Sums { grid: [0.0; CELLS], roots: [0; CELLS], nodes: vec![Node::default()] }
+    }
+}
+
+impl Sums {
+    /// Adds to the leaf at a point.
+    #[inline]
+    pub fn add(&mut self, mut p: Vec2, value: f64) {
+        let cell = cell(&mut p);
+        let mut node = self.roots[cell];
+        if node == 0 {
+            self.grid[cell] += value;
+            return;
+        }
+        loop {
+            let child = descend(&mut p);
+            let Node { value: sums, child: children } = &mut self.nodes[usize::from(node)];
+            node = children[child];
+            if node == 0 {
+                sums[child] += value;
+                return;
+            }
+        }
+    }
+
+    /// Level of the leaf at a point, counted from the square.
+    fn level(&self, mut p: Vec2) -> u32 {
+        let mut node = self.roots[cell(&mut p)];
+        let mut level = GRID_LEVEL;
+        while node != 0 {
+            node = self.nodes[usize::from(node)].child[descend(&mut p)];
+            level += 1;
+        }
+        level
+    }
+
+    /// Adds to all leaves that a square overlaps which is as large as the leaf at the point and has the point in its
+    /// middle, to each by area. It goes round in the angle, and is moved inside at the poles: nothing is lost.
+    pub fn add_box(&mut self, p: Vec2, value: f64) {
+        let size = (-f64::from(self.level(p))).exp2();
+        let low_u = (f64::from(p.x) - 0.5 * size).clamp(0.0, 1.0 - size);
+        let low_v = f64::from(p.y) - 0.5 * size;
+        let density = value / (size * size);
+        for turn in [-1.0, 0.0, 1.0] {
+            let (from, to) = ((low_v + turn).max(0.0), (low_v + turn + size).min(1.0));
+            if from < to {
+                self.spread([low_u, from], [low_u + size, to], density);
+            }
+        }
+    }
+
+    /// Adds a density over a rectangle inside the square.
+    fn spread(&mut self, from: [f64; 2], to: [f64; 2], density: f64) {
+        const SIZE: f64 = 1.0 / EDGE as f64;
+        let range = |axis: usize| {
+            let first = (from[axis] / SIZE) as usize;
+            first.min(EDGE - 1)..=((to[axis] / SIZE) as usize).min(EDGE - 1)
+        };
+        for j in range(1) {
+            for i in range(0) {
+                let low = [i as f64 * SIZE, j as f64 * SIZE];
+                let area = overlap(from, to, low, SIZE);
+                let cell = j * EDGE + i;
+                match self.roots[cell] {
+                    _ if area <= 0.0 => {}
+                    0 => self.grid[cell] += area * density,
+                    root => self.spread_below(root, low, 0.5 * SIZE, from, to, density),
+                }
+            }
+        }
+    }
+
+    fn spread_below(&mut self, node: u16, low: [f64; 2], half: f64, from: [f64; 2], to: [f64; 2], density: f64) {
+        for child in 0..4 {
+            let at = [low[0] + half * (child & 1) as f64, low[1] + half * (child >> 1) as f64];
+            let area = overlap(from, to, at, half);
+            match self.nodes[usize::from(node)].child[child] {
+                _ if area <= 0.0 => {}
+                0 => self.nodes[usize::from(node)].value[child] += area * density,
+                below => self.spread_below(below, at, 0.5 * half, from, to, density),
+            }
+        }
+    }
+
+    /// Sum below a node.
+    fn total_below(&self, node: u16) -> f64 {
+        let Node { value, child } = &self.nodes[usize::from(node)];
+        (0..4).map(|i| if child[i] == 0 { value[i] } else { self.total_below(child[i]) }).sum()
+    }
+
+    /// Sum of a cell of the grid.
+    fn cell_total(&self, cell: usize) -> f64 {
+        if self.roots[cell] == 0 { self.grid[cell] } else { self.total_below(self.roots[cell]) }
+    }
+
+    /// Sum of all.
+    pub fn total(&self) -> f64 {
+        (0..CELLS).map(|cell| self.cell_total(cell)).sum()
+    }
+
+    /// An empty tree whose leaves have about the same flux each, if that is distributed as here.
+    pub fn refined(&self, how: Refinement) -> Sums {
+        let total = self.total();
+        let mut new = Sums::default();
+        if !(total > 0.0 && total.is_finite()) {
+            return new;
+        }
+        // From the top downwards, so that a tree that is full is balanced: the place of a child, its node here if it has
+        // one, its flux and its level.
+        let mut open: VecDeque<(Option<u16>, usize, u16, f64, u32)> = VecDeque::new();
+        for cell in 0..CELLS {
+            open.push_back((None, cell, self.roots[cell], self.cell_total(cell) / total, GRID_LEVEL));
+        }
+        while let Some((parent, place, old, flux, level)) = open.pop_front() {
+            if flux <= how.threshold || level >= how.depth || new.nodes.len() >= MOST_NODES {
+                continue;
+            }
+            let index = new.nodes.len() as u16;
+            new.nodes.push(Node::default());
+            match parent {
+                None => new.roots[place] = index,
+                Some(parent) => new.nodes[usize::from(parent)].child[place] = index,
+            }
+            for child in 0..4 {
+                let (below, part) = match old {
+                    0 => (0, 0.25 * flux),
+                    old => {
+                        let Node { value, child: children } = &self.nodes[usize::from(old)];
+                        match children[child] {
+                            0 => (0, value[child] / total),
+                            below => (below, self.total_below(below) / total),
+                        }
+                    }
+                };
+                open.push_back((Some(index), child, below, part, level + 1));
+            }
+        }
+        new
+    }
+
+    /// Bytes it takes.
+    pub fn bytes(&self) -> usize {
+        size_of::<Self>() + self.nodes.len() * size_of::<Node<f64>>()
+    }
+}
+
+/// Area that a rectangle shares with a square.
+fn overlap(from: [f64; 2], to: [f64; 2], low: [f64; 2], size: f64) -> f64 {
+    let side = |axis: usize| (to[axis].min(low[axis] + size) - from[axis].max(low[axis])).max(0.0);
+    side(0) * side(1)
+}
+
+/// A tree to sample from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Quadtree {
+    /// Part of the flux in each cell; they sum to 1.
+    pub grid: [f32; CELLS],
+    roots: [u16; CELLS],
+    /// Part of the flux in each child. The first one is not used.
+    nodes: Vec<Node<f32>>,
+}
+
+impl Quadtree {
+    /// Of what was summed; `None` if nothing was.
+    pub fn new(sums: &Sums) -> Option<Self> {
+        let total = sums.total();
+        if !(total > 0.0 && total.is_finite()) {
+            return None;
+        }
+        let mut tree = Quadtree { grid: [0.0; CELLS], roots: sums.roots, nodes: Vec::with_capacity(sums.nodes.len()) };
+        for (cell, part) in tree.grid.iter_mut().enumerate() {
+            *part = (sums.cell_total(cell) / total) as f32;
+        }
+        for node in &sums.nodes {
+            let parts = [0, 1, 2, 3].map(|i: usize| match node.child[i] {
+                0 => node.value[i],
+                below => sums.total_below(below),
+            });
+            let total: f64 = parts.iter().sum();
+            // A node without flux is never reached.
+            let value = parts.map(|part| if total > 0.0 { (part / total) as f32 } else { 0.25 });
+            tree.nodes.push(Node { value, child: node.child });
+        }
+        Some(tree)
+    }
+
+    /// The cell of a point, and its density relative to a uniform one inside this cell.
+    #[inline]
+    pub fn pdf_in_cell(&self, mut p: Vec2) -> (usize, f32) {
+        let cell = cell(&mut p);
+        let mut node = self.roots[cell];
+        let mut density = 1.0;
+        while node != 0 {
+            let child = descend(&mut p);
+            let Node { value, child: children } = &self.nodes[usize::from(node)];
+            density *= 4.0 * value[child];
+            node = children[child];
+        }
+        (cell, density)
+    }
+
+    /// A point of a cell in the whole square, and its density relative to a uniform one inside this cell. Both numbers
+    /// are used again on every level; double precision keeps what they have.
+    #[inline]
+    pub fn sample_in_cell(&self, cell: usize, u: [f64; 2]) -> (Vec2, f32) {
+        let [mut x, mut y] = u;
+        let mut low = [(cell % EDGE) as f64, (cell / EDGE) as f64].map(|i| i / EDGE as f64);
+        let mut size = 1.0 / EDGE as f64;
+        let mut node = self.roots[cell];
+        let mut density = 1.0;
+        while node != 0 {
+            let Node { value, child: children } = &self.nodes[usize::from(node)];
+            size *= 0.5;
+            let lower = value[0] + value[1];
+            let (j, rest) = choose(y, lower / (lower + value[2] + value[3]));
+            let (a, b) = (value[2 * j], value[2 * j + 1]);
+            let (i, rest_x) = choose(x, a / (a + b));
+            (x, y) = (rest_x, rest);
+            low = [low[0] + size * i as f64, low[1] + size * j as f64];
+            density *= 4.0 * value[2 * j + i];
+            node = children[2 * j + i];
+        }
+        let p = Vec2::new((low[0] + size * x) as f32, (low[1] + size * y) as f32);
+        (p.min(Vec2::splat(ONE_MINUS_EPSILON)), density)
+    }
+
+    /// Nodes below the grid.
+    pub fn nodes(&self) -> usize {
+        self.nodes.len() - 1
+    }
+
+    /// Bytes it takes.
+    pub fn bytes(&self) -> usize {
+        size_of::<Self>() + self.nodes.len() * size_of::<Node<f32>>()
+    }
+
+    /// Checks that all parts are probabilities and sum to one, and that every node is reached once.
+    ///
+    /// # Errors
+    /// What does not hold.
+    pub fn validate(&self) -> Result<(), String> {
+        let is_distribution = |parts: &[f32]| {
+            let sum: f32 = parts.iter().sum();
+            parts.iter().all(|p| *p >= 0.0) && (sum - 1.0).abs() < 1e-4
+        };
+        if !is_distribution(&self.grid) {
+            return Err("the grid of a quadtree does not sum to 1".to_owned());
+        }
+        let mut reached = vec![0; self.nodes.len()];
+        let children = self.nodes.iter().skip(1).flat_map(|node| node.child);
+        for child in self.roots.iter().copied().chain(children).filter(|child| *child != 0) {
+            match reached.get_mut(usize::from(child)) {
+                Some(times) => *times += 1,
+                None => return Err(format!("a quadtree refers to node {child}, which it does not have")),
+            }
+        }
+        if reached.iter().skip(1).any(|times| *times != 1) {
+            return Err("a node of a quadtree is not reached exactly once".to_owned());
+        }
+        match self.nodes.iter().skip(1).all(|node| is_distribution(&node.value)) {
+            true => Ok(()),
+            false => Err("the children of a quadtree's node do not sum to 1".to_owned()),
+        }
+    }
+}
+
+/// 0 with this probability or else 1, and what is left of the number.
+#[inline]
+fn choose(u: f64, p: f32) -> (usize, f64) {
+    let p = f64::from(p);
+    if u < p { (0, u / p) } else { (1, ((u - p) / (1.0 - p)).min(1.0 - f64::EPSILON)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lucerna_core::sampling::Pcg32;
+
+    const HOW: Refinement = Refinement { threshold: 0.01, depth: 20 };
+
+    /// Sums of points that gather in two places, after two rounds of refinement.
+    fn trained(box_filter: bool) -> Sums {
+        let mut sums = Sums::default();
+        for round in 0..4 {
+            let mut pcg = Pcg32::new(3, round);
+            for i in 0..20_000 {
+                let mut next = || pcg.next_f32();
+                let p = match i % 3 {
+                    0 => Vec2::new(next(), next()),
+                    1 => Vec2::new(0.3 + 0.001 * next(), 0.999 + 0.001 * next()),
+                    _ => Vec2::new(0.9 + 0.1 * next(), 0.02 * next()),
+                };
+                let p = p.min(Vec2::splat(ONE_MINUS_EPSILON));
+                if box_filter { sums.add_box(p, 1.0) } else { sums.add(p, 1.0) }
+            }
+            if round < 3 {
+                sums = sums.refined(HOW);
+            }
+        }
+        sums
+    }
+
+    #[test]
+    fn nothing_is_lost_by_either_filter() {
+        for filter in [false, true] {
+            let total = trained(filter).total();
+            assert!((total / 20_000.0 - 1.0).abs() < 1e-9, "{filter}: {total}");
+        }
+    }
+
+    /// What lies at an angle of nearly 2π also adds to those near 0.
+    #[test]
+    fn the_box_goes_round() {
+        let mut sums = Sums::default();
+        sums.add_box(Vec2::new(0.99, 0.999), 1.0);
+        let (first, last) = (sums.cell_total(EDGE - 1), sums.cell_total(CELLS - 1));
+        assert!((first - 0.492).abs() < 1e-6 && (last - 0.508).abs() < 1e-6, "{first} {last}");
+    }
+
+    #[test]
+    fn cells_with_much_flux_are_divided() {
+        let tree = Quadtree::new(&trained(false)).unwrap();
+        tree.validate().unwrap();
+        assert!(tree.nodes() > 20 && tree.nodes() < 600, "{}", tree.nodes());
+        let (_, peak) = tree.pdf_in_cell(Vec2::new(0.3005, 0.9995));
+        assert!(peak > 1000.0, "{peak}");
+    }
+
+    #[test]
+    fn hc_p02_sums_of_nothing_one_and_extremes_are_usable() {
+        assert_eq!(Quadtree::new(&Sums::default()), None);
+        assert_eq!(Sums::default().refined(HOW), Sums::default());
+        for value in [1e30, 1e-30, 1.0] {
+            let mut sums = Sums::default();
+            for _ in 0..30 {
+                sums.add(Vec2::new(0.2, 0.7), value);
+                let tree = Quadtree::new(&sums).unwrap();
+                tree.validate().unwrap();
+                assert!(tree.pdf_in_cell(Vec2::new(0.2, 0.7)).1.is_finite());
+                let mut next = sums.refined(HOW);
+                next.add_box(Vec2::new(0.2, 0.7), value);
+                Quadtree::new(&next).unwrap().validate().unwrap();
+                sums = sums.refined(HOW);
+            }
+        }
+        let mut sums = Sums::default();
+        sums.add(Vec2::ZERO, f64::INFINITY);
+        assert_eq!(Quadtree::new(&sums), None);
+    }
+
+    /// The density of samples is that of the same point, and the cell too.
+    #[test]
+    fn samples_have_their_density() {
+        let tree = Quadtree::new(&trained(true)).unwrap();
+        let mut pcg = Pcg32::new(1, 1);
+        for _ in 0..20_000 {
+            let from = (pcg.next_below(CELLS as u32)) as usize;
+            let (p, density) = tree.sample_in_cell(from, [pcg.next_f32(), pcg.next_f32()].map(f64::from));
+            let (cell, expected) = tree.pdf_in_cell(p);
+            assert!(cell == from && (density / expected - 1.0).abs() < 1e-5, "{p}: {density} {expected}");
+        }
+    }
+}

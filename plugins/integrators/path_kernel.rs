@@ -1,0 +1,397 @@
+//! The path that `path` follows, whatever decides about its directions.
+//!
+//! The kernel is compiled once for each way to decide ([`Directions`]); where nothing is learnt it is what it would be
+//! without any of this.
+
+use super::common::{PathLimits, Scattered, emission, find_surface, mis_weight, survival};
+use super::lights::PickLights;
+use lucerna_core::accel::Ray;
+use lucerna_core::color::Rgb;
+use lucerna_core::interfaces::{
+    Arena, Bxdf, BxdfSample, CameraRay, GuidedDirections, LightPoint, LightSample, Lobes, MOST_GUIDED, Radiance,
+    RecordKind, SurfaceHit, Transport,
+};
+use lucerna_core::math::{ONE_MINUS_EPSILON, Vec2, Vec3};
+use lucerna_core::render::{Guidance, Notebook, Scattering};
+use lucerna_core::sampling::Stream;
+use lucerna_core::scene::Scene;
+
+/// Who decides in which direction a path goes on, and keeps notes.
+pub(super) trait Directions {
+    /// What is known at a vertex: read once, then used for all that happens there.
+    type Here: Copy;
+
+    /// Reads it. `smooth` says whether the BSDF has a lobe with a density here.
+    fn here(&self, hit: &SurfaceHit, bxdf: &dyn Bxdf) -> Self::Here;
+
+    /// Whether lights are sampled that a ray can also run into.
+    fn samples_emitters(&self) -> bool;
+
+    /// Density of world direction `d` in which the BSDF alone has density `pdf_bsdf`.
+    fn mixed_pdf(here: Self::Here, d: Vec3, pdf_bsdf: f32) -> f32;
+
+    /// Where the path goes on, in world space, and how.
+    fn sample(here: Self::Here, hit: &SurfaceHit, bxdf: &dyn Bxdf, u1: f32, u2: Vec2) -> Option<Step>;
+
+    /// Notes light of a sampled emitter.
+    fn note_direct(&mut self, light: Rgb);
+
+    /// Notes where the path goes on.
+    fn note_step(&mut self, here: Self::Here, hit: &SurfaceHit, step: &Step);
+
+    /// Notes that roulette was survived.
+    fn note_survival(&mut self, q: f32);
+
+    /// Notes light that was found by chance.
+    fn note_met(&mut self, light: Rgb, alone: bool);
+
+    /// Notes the end of the path.
+    fn note_end(&mut self);
+}
+
+/// A direction that was chosen.
+pub(super) struct Step {
+    /// It and its weight; the density is that of the mixture.
+    pub sample: BxdfSample,
+    /// In world space.
+    pub d: Vec3,
+    /// Its density in the BSDF alone, or the probability of the delta lobe.
+    pub pdf_bsdf: f32,
+    /// Its density in the guide alone.
+    pub pdf_guide: f32,
+}
+
+/// Directions come from the BSDF, and nothing is noted.
+pub(super) struct Unguided;
+
+impl Directions for Unguided {
+    type Here = ();
+
+    #[inline(always)]
+    fn here(&self, _hit: &SurfaceHit, _bxdf: &dyn Bxdf) {}
+
+    #[inline(always)]
+    fn samples_emitters(&self) -> bool {
+        true
+    }
+
+    #[inline(always)]
+    fn mixed_pdf((): (), _d: Vec3, pdf_bsdf: f32) -> f32 {
+        pdf_bsdf
+    }
+
+    #[inline(always)]
+    fn sample((): (), hit: &SurfaceHit, bxdf: &dyn Bxdf, u1: f32, u2: Vec2) -> Option<Step> {
+        let sample = bxdf.sample(hit.wi, u1, u2, Transport::Radiance)?;
+        Some(Step { d: hit.to_world(sample.wo), pdf_bsdf: sample.pdf, pdf_guide: 0.0, sample })
+    }
+
+    #[inline(always)]
+    fn note_direct(&mut self, _light: Rgb) {}
+
+    #[inline(always)]
+    fn note_step(&mut self, (): (), _hit: &SurfaceHit, _step: &Step) {}
+
+    #[inline(always)]
+    fn note_survival(&mut self, _q: f32) {}
+
+    #[inline(always)]
+    fn note_met(&mut self, _light: Rgb, _alone: bool) {}
+
+    #[inline(always)]
+    fn note_end(&mut self) {}
+}
+
+/// Directions come from the mixture of a guide and the BSDF.
+pub(super) struct Guided<'a> {
+    /// What holds during the pass.
+    pub guidance: Guidance<'a>,
+    /// Where what is found is noted.
+    pub notes: &'a mut Notebook,
+    /// Where closed forms of what was learnt are made.
+    pub arena: &'a Arena,
+}
+
+/// What a guide knows at a vertex.
+#[derive(Clone, Copy)]
+pub(super) struct Learnt<'v> {
+    /// With its probability; none where the BSDF stands alone.
+    guide: Option<(&'v dyn GuidedDirections, f32)>,
+    /// Something can be learnt here.
+    teaches: bool,
+    /// The BSDF also has delta lobes.
+    hybrid: bool,
+}
+
+impl<'a> Directions for Guided<'a> {
+    type Here = Learnt<'a>;
+
+    #[inline]
+    fn here(&self, hit: &SurfaceHit, bxdf: &dyn Bxdf) -> Learnt<'a> {
+        let lobes = bxdf.lobes();
+        let hybrid = lobes.has_delta();
+        if !lobes.is_smooth() || bxdf.roughness() < self.guidance.least_roughness {
+            return Learnt { guide: None, teaches: false, hybrid };
+        }
+        let one_sided = !lobes.and(Lobes::SMOOTH).intersects(Lobes::TRANSMISSION);
+        let guide = self.guidance.field.at(hit, one_sided, self.arena).and_then(|guide| {
+            let p = guide.p_guide().clamp(0.0, MOST_GUIDED);
+            (p > 0.0).then_some((guide, p))
+        });
+        Learnt { guide, teaches: true, hybrid }
+    }
+
+    #[inline]
+    fn samples_emitters(&self) -> bool {
+        self.guidance.sample_emitters
+    }
+
+    #[inline]
+    fn mixed_pdf(here: Learnt<'a>, d: Vec3, pdf_bsdf: f32) -> f32 {
+        match here.guide {
+            Some((guide, p_guide)) => p_guide * guide.pdf(d) + (1.0 - p_guide) * pdf_bsdf,
+            None => pdf_bsdf,
+        }
+    }
+
+    /// One-sample mixture (Veach 1997, section 9.2.4, with the balance heuristic): whichever chose the direction, it is
+    /// weighted by the density of the mixture. Delta lobes belong to the BSDF alone.
+    #[inline]
+    fn sample(here: Learnt<'a>, hit: &SurfaceHit, bxdf: &dyn Bxdf, u1: f32, u2: Vec2) -> Option<Step> {
+        let Some((guide, p_guide)) = here.guide else { return Unguided::sample((), hit, bxdf, u1, u2) };
+        if u1 < p_guide {
+            let (d, pdf_guide) = guide.sample(u2);
+            let wo = hit.to_local(d);
+            let (value, pdf_bsdf) = bxdf.eval_pdf(hit.wi, wo, Transport::Radiance);
+            let pdf = p_guide * pdf_guide + (1.0 - p_guide) * pdf_bsdf;
+            let weight = value * (1.0 / pdf);
+            if value.is_black() || !weight.is_finite() {
+                return None;
+            }
+            // The index of refraction only serves roulette, which may be told anything.
+            let lobe = bxdf.lobes().and(Lobes::SMOOTH);
+            return Some(Step { sample: BxdfSample { wo, weight, pdf, eta: 1.0, lobe }, d, pdf_bsdf, pdf_guide });
+        }
+        let p_bsdf = 1.0 - p_guide;
+        let rest = ((u1 - p_guide) / p_bsdf).min(ONE_MINUS_EPSILON);
+        let mut step = Unguided::sample((), hit, bxdf, rest, u2)?;
+        if step.sample.lobe.has_delta() {
+            step.sample.weight *= 1.0 / p_bsdf;
+            step.sample.pdf *= p_bsdf;
+            return Some(step);
+        }
+        step.pdf_guide = guide.pdf(step.d);
+        let pdf = p_guide * step.pdf_guide + p_bsdf * step.pdf_bsdf;
+        step.sample.weight *= step.pdf_bsdf / pdf;
+        step.sample.pdf = pdf;
+        Some(step)
+    }
+
+    #[inline]
+    fn note_direct(&mut self, light: Rgb) {
+        if self.guidance.learning {
+            self.notes.direct(light);
+        }
+    }
+
+    #[inline]
+    fn note_step(&mut self, here: Learnt<'a>, hit: &SurfaceHit, step: &Step) {
+        if !self.guidance.learning {
+            return;
+        }
+        let kind = match (here.teaches, step.sample.lobe.has_delta(), here.guide) {
+            (false, ..) => None,
+            // A pure passage belongs to what lies behind; a mirror teaches how often it is taken.
+            (true, true, Some(_)) if here.hybrid => Some(RecordKind::Delta),
+            (true, true, _) => None,
+            (true, false, Some(_)) => Some(RecordKind::Mixed),
+            (true, false, None) => Some(RecordKind::Unguided),
+        };
+        let BxdfSample { weight, pdf, .. } = step.sample;
+        let Step { d, pdf_bsdf, pdf_guide, .. } = *step;
+        self.notes.scattered(Scattering { p: hit.p, d, weight, pdf, pdf_bsdf, pdf_guide, kind });
+    }
+
+    #[inline]
+    fn note_survival(&mut self, q: f32) {
+        if self.guidance.learning {
+            self.notes.survived(q);
+        }
+    }
+
+    #[inline]
+    fn note_met(&mut self, light: Rgb, alone: bool) {
+        if self.guidance.learning {
+            self.notes.met(light, alone);
+        }
+    }
+
+    #[inline]
+    fn note_end(&mut self) {
+        if self.guidance.learning {
+            self.notes.end();
+        }
+    }
+}
+
+/// Follows one path.
+#[inline]
+pub(super) fn trace<D: Directions>(
+    limits: PathLimits,
+    scene: &Scene,
+    lights: &impl PickLights,
+    camera: &CameraRay,
+    stream: &mut Stream<'_>,
+    arena: &Arena,
+    directions: &mut D,
+) -> Radiance {
+    let PathLimits { max_depth, rr_depth, hide_emitters } = limits;
+    let mut found = Radiance::default();
+    if max_depth == 0 {
+        return found;
+    }
+    let visible_environment = !hide_emitters && scene.environment().is_some();
+    found.alpha = f32::from(visible_environment);
+    let mut ray = camera.ray;
+    let mut throughput = Rgb::WHITE;
+    let mut eta = 1.0;
+    // Of the vertex before; none at the camera and after a delta lobe, where light sampling has no part.
+    let mut last: Option<Scattered> = None;
+    let mut depth = 0;
+    let mut hit = SurfaceHit::default();
+    loop {
+        let hidden = hide_emitters && depth == 0;
+        let met = find_surface(scene, &ray, hidden, &mut hit, &mut found.rays);
+        if !hidden {
+            let light = met_emission(scene, lights, &ray, met.then_some(&hit), last, directions);
+            found.rgb += throughput * light;
+        }
+        if !met {
+            break;
+        }
+        if depth + 1 >= max_depth {
+            if depth == 0 && !found.rgb.is_black() {
+                found.alpha = 1.0;
+            }
+            break;
+        }
+        let bsdf = scene.bsdf(&hit);
+        let bxdf = bsdf.resolve(&hit, arena);
+        let here = directions.here(&hit, bxdf);
+        let lobes = bsdf.lobes();
+        let from = lights.vertex(&hit, lobes);
+        let worth = |light: &LightSample| {
+            let (contribution, pdf) = scattered(scene, &hit, bxdf, light);
+            (contribution * weight_of::<D>(light, here, pdf)).luminance()
+        };
+        if lobes.is_smooth()
+            && let Some(light) = lights.sample(scene, &from, stream, worth)
+            // What no ray can run into must be sampled in any case.
+            && (light.delta || directions.samples_emitters())
+        {
+            let direct = direct_light::<D>(scene, &hit, bxdf, &light, here, &mut found.rays);
+            directions.note_direct(direct);
+            found.rgb += throughput * direct;
+        }
+        let (u1, u2) = (stream.next_1d(), stream.next_2d());
+        let step = D::sample(here, &hit, bxdf, u1, u2);
+        // Drawn at every vertex, needed or not: the numbers of the next sample depend on it in the reference's order.
+        let u_roulette = stream.next_1d();
+        let Some(step) = step.filter(|step| scene.keeps_sides(&hit, step.sample.wo)) else {
+            found.alpha = 1.0;
+            break;
+        };
+        let sample = &step.sample;
+        throughput *= sample.weight;
+        eta *= sample.eta;
+        if sample.lobe != Lobes::NULL {
+            found.alpha = 1.0;
+        }
+        ray = hit.leave(step.d);
+        let weighs = !sample.lobe.has_delta() && directions.samples_emitters();
+        last = weighs.then_some(Scattered { from, pdf: sample.pdf });
+        depth += 1;
+        directions.note_step(here, &hit, &step);
+
+        if throughput.is_black() {
+            break;
+        }
+        if depth >= rr_depth {
+            let q = survival(throughput, eta);
+            if u_roulette >= q {
+                break;
+            }
+            throughput *= 1.0 / q;
+            directions.note_survival(q);
+        }
+    }
+    directions.note_end();
+    if found.alpha == 0.0 {
+        found.rgb = Rgb::BLACK;
+    }
+    found
+}
+
+/// Light that a ray has run into, weighted against emitter sampling if the path was scattered into a density before.
+#[inline]
+fn met_emission<D: Directions>(
+    scene: &Scene,
+    lights: &impl PickLights,
+    ray: &Ray,
+    hit: Option<&SurfaceHit>,
+    last: Option<Scattered>,
+    directions: &mut D,
+) -> Rgb {
+    let Some((id, radiance)) = emission(scene, ray, hit) else { return Rgb::BLACK };
+    let Some(last) = last else {
+        directions.note_met(radiance, true);
+        return radiance;
+    };
+    let point = match hit {
+        Some(hit) => LightPoint::of_hit(last.from.p, hit, ray.d),
+        None => LightPoint::of_environment(ray.d),
+    };
+    let pdf = lights.pdf(scene, id, &last.from, &point);
+    let light = radiance * mis_weight(last.pdf, pdf);
+    directions.note_met(light, pdf == 0.0);
+    light
+}
+
+/// Light of one emitter sample scattered at a hit, weighted against the sampling of directions.
+#[inline]
+fn direct_light<D: Directions>(
+    scene: &Scene,
+    hit: &SurfaceHit,
+    bxdf: &dyn Bxdf,
+    light: &LightSample,
+    here: D::Here,
+    rays: &mut u32,
+) -> Rgb {
+    let (contribution, pdf) = scattered(scene, hit, bxdf, light);
+    if contribution.is_black() {
+        return Rgb::BLACK;
+    }
+    *rays += 1;
+    if !scene.visible(hit, light) {
+        return Rgb::BLACK;
+    }
+    contribution * weight_of::<D>(light, here, pdf)
+}
+
+/// The same without the weight and as if nothing stood between, and the density of BSDF sampling.
+#[inline]
+fn scattered(scene: &Scene, hit: &SurfaceHit, bxdf: &dyn Bxdf, light: &LightSample) -> (Rgb, f32) {
+    let wo = hit.to_local(light.point.d);
+    let (value, pdf) = bxdf.eval_pdf(hit.wi, wo, Transport::Radiance);
+    let contribution = value * light.weight;
+    if contribution.is_black() || !scene.keeps_sides(hit, wo) {
+        return (Rgb::BLACK, pdf);
+    }
+    (contribution, pdf)
+}
+
+/// Weight of emitter sampling against the sampling of directions, in which the BSDF has density `pdf`.
+#[inline]
+fn weight_of<D: Directions>(light: &LightSample, here: D::Here, pdf: f32) -> f32 {
+    if light.delta { 1.0 } else { mis_weight(light.pdf, D::mixed_pdf(here, light.point.d, pdf)) }
+}

@@ -1,0 +1,217 @@
+//! A guide that is wrong on purpose: it learns as `sd_tree` does, and spoils what is asked of it.
+
+use lucerna::core::interfaces::{
+    Arena, Guide, GuideField, GuideLearner, GuideRecord, GuidedDirections, SurfaceHit, Training, mix,
+};
+use lucerna::core::math::{Aabb, Vec2, Vec3};
+use lucerna::core::sampling::warp::square_to_sphere;
+use lucerna::core::scene::{
+    Built, Constructor, Description, Location, Node, Object, ObjectKind, Param, Plugin, Properties, build_one,
+};
+use std::f32::consts::{PI, TAU};
+use std::sync::Arc;
+
+/// Ways to be wrong.
+pub const WAYS: &[&str] = &["none", "random", "inverted", "one_direction", "one_cell", "empty"];
+
+/// Table entry.
+pub const PLUGIN: Plugin = Plugin {
+    name: "corrupted",
+    aliases: &[],
+    summary: "a guide that is wrong on purpose",
+    params: &[&[
+        Param::string("way", "none", "in which way; \"wrong\" has a density that is not that of its samples"),
+        Param::float_opt("p_guide", "probability of the guide; as learnt if unset"),
+        Param::choice("nee", &["never", "kickstart", "always"], "always", "when lights are sampled"),
+    ]],
+    build: Constructor::Guide(build),
+};
+
+fn build(p: &Properties<'_>) -> Built<dyn Guide> {
+    let at = Location::file("corrupted".to_owned());
+    let value = |name: &str, value: lucerna::core::scene::Value| lucerna::core::scene::Parameter {
+        name: name.to_owned(),
+        value,
+        at: at.clone(),
+    };
+    let node = Node {
+        kind: ObjectKind::Guide,
+        plugin: "sd_tree".to_owned(),
+        id: None,
+        parameters: vec![
+            value("nee", lucerna::core::scene::Value::String(p.choice("nee").to_owned())),
+            // Small, so that a few samples make many cells.
+            value("spatial_threshold", lucerna::core::scene::Value::Float(200.0)),
+        ],
+        at: at.clone(),
+        included_from: Vec::new(),
+    };
+    match build_one(&lucerna::builtin(), &Description::of(node)) {
+        Ok(Object::Guide(inner)) => {
+            Ok(Arc::new(Corrupted { inner, way: p.string("way").to_owned(), p_guide: p.float_opt("p_guide") }))
+        }
+        _ => Err(p.error("", "sd_tree cannot be built")),
+    }
+}
+
+struct Corrupted {
+    inner: Arc<dyn Guide>,
+    way: String,
+    p_guide: Option<f32>,
+}
+
+impl Guide for Corrupted {
+    fn start(&self, bounds: Aabb) -> Box<dyn GuideLearner> {
+        Box::new(Learner { inner: self.inner.start(bounds), way: self.way.clone(), p_guide: self.p_guide })
+    }
+
+    fn training(&self) -> Training {
+        self.inner.training()
+    }
+}
+
+struct Learner {
+    inner: Box<dyn GuideLearner>,
+    way: String,
+    p_guide: Option<f32>,
+}
+
+impl GuideLearner for Learner {
+    fn learn(&mut self, tiles: &[Vec<GuideRecord>]) {
+        self.inner.learn(tiles);
+    }
+
+    fn refine(&mut self, spp: u32) {
+        self.inner.refine(spp);
+        self.inner.field().validate().expect("the field is sound");
+    }
+
+    fn field(&self) -> Arc<dyn GuideField> {
+        Arc::new(Field { inner: self.inner.field(), way: self.way.clone(), p_guide: self.p_guide })
+    }
+
+    fn summary(&self) -> Vec<String> {
+        self.inner.summary()
+    }
+}
+
+struct Field {
+    inner: Arc<dyn GuideField>,
+    way: String,
+    p_guide: Option<f32>,
+}
+
+impl GuideField for Field {
+    fn at<'g>(&'g self, hit: &SurfaceHit, one_sided: bool, arena: &'g Arena) -> Option<&'g dyn GuidedDirections> {
+        if self.way == "empty" {
+            return None;
+        }
+        let inner = self.inner.at(hit, one_sided, arena)?;
+        let place = (hit.p * 4.0).floor();
+        let key = [place.x, place.y, place.z].iter().fold(0, |key, x| mix(key ^ u64::from(x.to_bits())));
+        let p_guide = self.p_guide.unwrap_or_else(|| inner.p_guide());
+        Some(arena.alloc(Spoilt { inner, way: &self.way, p_guide, key }))
+    }
+
+    fn incident(&self, p: Vec3, d: Vec3) -> Option<f32> {
+        self.inner.incident(p, d)
+    }
+
+    fn validate(&self) -> Result<(), String> {
+        self.inner.validate()
+    }
+}
+
+struct Spoilt<'g> {
+    inner: &'g dyn GuidedDirections,
+    way: &'g str,
+    p_guide: f32,
+    key: u64,
+}
+
+/// The octant of a direction.
+fn octant(d: Vec3) -> usize {
+    usize::from(d.x < 0.0) + 2 * usize::from(d.y < 0.0) + 4 * usize::from(d.z < 0.0)
+}
+
+/// Uniform in the cone about +z.
+fn in_cone(u2: Vec2) -> Vec3 {
+    let z = 1.0 - u2.x * (1.0 - NARROW);
+    let (sin, cos) = (TAU * u2.y).sin_cos();
+    let r = (1.0 - z * z).max(0.0).sqrt();
+    Vec3::new(r * cos, r * sin, z)
+}
+
+/// Cosine of the cone that holds all of the one direction.
+const NARROW: f32 = 0.9999;
+
+impl Spoilt<'_> {
+    /// Random weights of the octants; some are zero.
+    fn weights(&self) -> [f32; 8] {
+        let weights = std::array::from_fn(|i| ((mix(self.key ^ i as u64) & 0xff) as f32 - 80.0).max(0.0));
+        if weights.iter().sum::<f32>() > 0.0 { weights } else { [1.0; 8] }
+    }
+
+    /// A direction in an octant.
+    fn in_octant(octant: usize, u2: Vec2) -> Vec3 {
+        let d = square_to_sphere(u2).abs();
+        let sign = |bit: usize| if octant & bit == 0 { 1.0 } else { -1.0 };
+        Vec3::new(sign(1) * d.x, sign(2) * d.y, sign(4) * d.z)
+    }
+}
+
+impl GuidedDirections for Spoilt<'_> {
+    fn p_guide(&self) -> f32 {
+        self.p_guide
+    }
+
+    fn sample(&self, u2: Vec2) -> (Vec3, f32) {
+        let d = match self.way {
+            "random" => {
+                let weights = self.weights();
+                let mut rest = u2.x * weights.iter().sum::<f32>();
+                let mut chosen = weights.iter().rposition(|w| *w > 0.0).unwrap_or(0);
+                for (i, weight) in weights.iter().enumerate() {
+                    if rest < *weight {
+                        chosen = i;
+                        break;
+                    }
+                    rest -= weight;
+                }
+                let x = (rest / weights[chosen]).clamp(0.0, 0.999_999);
+                Self::in_octant(chosen, Vec2::new(x, u2.y))
+            }
+            "inverted" => -self.inner.sample(u2).0,
+            "one_direction" => in_cone(u2),
+            "one_cell" => Self::in_octant(5, u2),
+            _ => self.inner.sample(u2).0,
+        };
+        (d, self.pdf(d))
+    }
+
+    fn pdf(&self, d: Vec3) -> f32 {
+        match self.way {
+            "random" => {
+                let weights = self.weights();
+                weights[octant(d)] / weights.iter().sum::<f32>() * 8.0 / (4.0 * PI)
+            }
+            "inverted" => self.inner.pdf(-d),
+            "one_direction" => {
+                if d.z >= NARROW {
+                    1.0 / (TAU * (1.0 - NARROW))
+                } else {
+                    0.0
+                }
+            }
+            "one_cell" => {
+                if octant(d) == 5 {
+                    8.0 / (4.0 * PI)
+                } else {
+                    0.0
+                }
+            }
+            "wrong" => 0.95 * self.inner.pdf(d),
+            _ => self.inner.pdf(d),
+        }
+    }
+}

@@ -1,0 +1,31 @@
+//! Guided paths: unbiased whatever was learnt, the same bits for any number of threads, densities that are those of the
+//! samples.
+
+mod corrupted;
+mod determinism;
+#[path = "../support/mod.rs"]
+mod support;
+mod unbiased;
+
+use lucerna::core::scene::xml::{LoadOptions, load_str};
+use lucerna::core::scene::{Scene, instantiate, resolve, upgrade};
+
+/// A scene of this folder with this integrator inside.
+fn scene(text: &str, integrator: &str) -> Scene {
+    let text = text.replace("<!-- integrator -->", integrator);
+    let mut description = load_str(&text, "scene.xml", &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
+    resolve::resolve(&mut description).unwrap_or_else(|e| panic!("{e}"));
+    upgrade::upgrade(&mut description);
+    let mut registry = lucerna::builtin();
+    registry.add(corrupted::PLUGIN);
+    instantiate(&registry, description, false).unwrap_or_else(|e| panic!("{e}")).scene
+}
+
+/// Four small scenes with what a guide may do wrong: light from below and through a gap, glass and mirrors, BSDFs of smooth
+/// and delta lobes, transmission, light from everywhere and from a point.
+const SCENES: [(&str, &str); 4] = [
+    ("gap", include_str!("gap.xml")),
+    ("glass", include_str!("glass.xml")),
+    ("sky", include_str!("sky.xml")),
+    ("leaves", include_str!("leaves.xml")),
+];

@@ -1,0 +1,131 @@
+//! Guided pictures agree with those of `path`, however good or bad the guide is.
+
+use super::{SCENES, corrupted, scene};
+use crate::support::render;
+use lucerna::core::image::Image;
+use lucerna::core::render::SampleOrder;
+use lucerna::core::stats::Measured;
+use lucerna::core::stats::chi2::sidak;
+use lucerna::core::stats::figures::measured;
+use lucerna::core::stats::images::{Scale, compare};
+
+/// Independent pictures of each method.
+const SEEDS: u32 = 10;
+
+fn pictures(text: &str, integrator: &str, spp: u32, first_seed: u32) -> Measured {
+    let scene = scene(text, integrator);
+    let shots: Vec<Image> =
+        (0..SEEDS).map(|seed| render(&scene, spp, first_seed + seed, SampleOrder::PerSample).0).collect();
+    Measured::of(&shots, &["R", "G", "B"].map(str::to_owned)).expect("ten pictures of a size")
+}
+
+fn path(depth: u32, guide: &str) -> String {
+    format!("<integrator type='path'><integer name='max_depth' value='{depth}'/>{guide}</integrator>")
+}
+
+/// Compares guides with `path` in these scenes; the level of 1 % is shared among all of them. Gives the error of the mean
+/// that would be found.
+fn agree(scenes: &[(&str, &str)], guides: &[String], depth: u32, spp: u32) -> f64 {
+    let level = sidak(0.01, guides.len() * scenes.len());
+    let mut blind: f64 = 0.0;
+    for &(name, text) in scenes {
+        let plain = pictures(text, &path(depth, ""), 2 * spp, 1000);
+        for (i, guide) in guides.iter().enumerate() {
+            let guided = pictures(text, &path(depth, guide), spp, 100 * (i as u32 + 20));
+            let found = compare(&guided, &plain, true, level).expect("of a kind");
+            let (difference, error) = found.mean_difference();
+            let worst = |scale| found.test(scale).worst().0;
+            assert!(
+                found.agrees(),
+                "{name}, {guide}: mean differs by {:.2} % ± {:.2} %; tiles {:?}; pixels {:?}",
+                100.0 * difference,
+                100.0 * error,
+                worst(Scale::Tile),
+                worst(Scale::Pixel)
+            );
+            blind = blind.max(found.detectable());
+        }
+    }
+    blind
+}
+
+#[test]
+fn hc_p06_every_setting_of_the_tree_is_unbiased() {
+    let small = "<float name='spatial_threshold' value='200'/>";
+    let guide = |more: &str| format!("<guide type='sd_tree'>{small}{more}</guide>");
+    let guides = [
+        guide(""),
+        guide("<string name='nee' value='never'/>"),
+        guide("<string name='nee' value='kickstart'/><boolean name='direct' value='false'/>"),
+        guide("<string name='product' value='none'/><string name='spatial_filter' value='box'/>"),
+        guide("<float name='roughness_threshold' value='0'/><string name='combination' value='last'/>"),
+        guide("<float name='p_guide' value='0'/>"),
+    ];
+    let blind = agree(&SCENES, &guides, 9, 64);
+    measured(
+        "hc_p06_every_setting_of_the_tree_is_unbiased",
+        format!(
+            "{} settings in {} scenes agree; an error of {:.1} % of the mean would be found",
+            guides.len(),
+            SCENES.len(),
+            100.0 * blind
+        ),
+    );
+}
+
+#[test]
+fn hc_p06_corrupted_guides_are_unbiased() {
+    let mut guides = Vec::new();
+    for way in corrupted::WAYS {
+        guides.push(format!("<guide type='corrupted'><string name='way' value='{way}'/></guide>"));
+    }
+    for (way, p_guide) in [("random", 0.9), ("inverted", 0.7), ("one_direction", 0.5), ("one_cell", 0.0)] {
+        guides.push(format!(
+            "<guide type='corrupted'><string name='way' value='{way}'/><float name='p_guide' value='{p_guide}'/>
+             <string name='nee' value='kickstart'/></guide>"
+        ));
+    }
+    let blind = agree(&SCENES, &guides, 9, 32);
+    measured(
+        "hc_p06_corrupted_guides_are_unbiased",
+        format!(
+            "{} corrupted guides in {} scenes agree; an error of {:.1} % of the mean would be found",
+            guides.len(),
+            SCENES.len(),
+            100.0 * blind
+        ),
+    );
+}
+
+/// A probability of 1 means 0.95. Where the guide is wrong, what the BSDF finds then counts twenty times at every vertex:
+/// after many of them, or where a delta lobe takes part, a picture of few samples lacks what is rare. So paths are short
+/// here, and nothing is of glass.
+#[test]
+fn hc_p06_a_selection_probability_of_one_is_unbiased() {
+    let wrong = |way: &str| {
+        format!("<guide type='corrupted'><string name='way' value='{way}'/><float name='p_guide' value='1'/></guide>")
+    };
+    let right =
+        "<guide type='sd_tree'><float name='spatial_threshold' value='200'/><float name='p_guide' value='1'/></guide>";
+    let guides = [right.to_owned(), wrong("inverted"), wrong("random"), wrong("one_cell")];
+    let scenes = [SCENES[0], SCENES[2]];
+    let blind = agree(&scenes, &guides, 3, 128);
+    measured(
+        "hc_p06_a_selection_probability_of_one_is_unbiased",
+        format!(
+            "{} guides in {} scenes agree; an error of {:.1} % of the mean would be found",
+            guides.len(),
+            scenes.len(),
+            100.0 * blind
+        ),
+    );
+}
+
+/// The test of the test: a guide whose density is a few percent too low makes a picture too bright.
+#[test]
+fn a_density_that_is_wrong_would_be_found() {
+    let guide = "<guide type='corrupted'><string name='way' value='wrong'/><float name='p_guide' value='0.9'/></guide>";
+    let plain = pictures(SCENES[2].1, &path(9, ""), 64, 1000);
+    let guided = pictures(SCENES[2].1, &path(9, guide), 64, 2000);
+    assert!(!compare(&guided, &plain, true, 0.01).expect("of a kind").agrees());
+}
