@@ -235,7 +235,7 @@ impl<'a> Directions for Guided<'a> {
 }
 
 /// Follows one path.
-#[inline]
+#[inline(always)]
 pub(super) fn trace<D: Directions>(
     limits: PathLimits,
     scene: &Scene,
@@ -333,7 +333,7 @@ pub(super) fn trace<D: Directions>(
 }
 
 /// Light that a ray has run into, weighted against emitter sampling if the path was scattered into a density before.
-#[inline]
+#[inline(always)]
 fn met_emission<D: Directions>(
     scene: &Scene,
     lights: &impl PickLights,
@@ -358,7 +358,7 @@ fn met_emission<D: Directions>(
 }
 
 /// Light of one emitter sample scattered at a hit, weighted against the sampling of directions.
-#[inline]
+#[inline(always)]
 fn direct_light<D: Directions>(
     scene: &Scene,
     hit: &SurfaceHit,
@@ -379,7 +379,7 @@ fn direct_light<D: Directions>(
 }
 
 /// The same without the weight and as if nothing stood between, and the density of BSDF sampling.
-#[inline]
+#[inline(always)]
 fn scattered(scene: &Scene, hit: &SurfaceHit, bxdf: &dyn Bxdf, light: &LightSample) -> (Rgb, f32) {
     let wo = hit.to_local(light.point.d);
     let (value, pdf) = bxdf.eval_pdf(hit.wi, wo, Transport::Radiance);
@@ -391,7 +391,7 @@ fn scattered(scene: &Scene, hit: &SurfaceHit, bxdf: &dyn Bxdf, light: &LightSamp
 }
 
 /// Weight of emitter sampling against the sampling of directions, in which the BSDF has density `pdf`.
-#[inline]
+#[inline(always)]
 fn weight_of<D: Directions>(light: &LightSample, here: D::Here, pdf: f32) -> f32 {
     if light.delta { 1.0 } else { mis_weight(light.pdf, D::mixed_pdf(here, light.point.d, pdf)) }
 }
