@@ -20,11 +20,8 @@
 //! | `candidates` | integer | 8 | M, at least 1 |
 //! | nested `light_sampler` | | `light_tree` | where candidates come from |
 //!
-//! | | paper | here |
-//! |---|---|---|
-//! | candidates | independent | stratified |
-//! | p̂ | luminance of the unblocked light | the same, times the weight against BSDF sampling |
-//! | kept of M | one or more | one |
+//! Against the paper: candidates are stratified; p̂ includes the weight against BSDF sampling; one of them is kept, never
+//! more.
 //!
 //! ```xml
 //! <integrator type="path">

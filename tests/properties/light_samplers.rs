@@ -100,7 +100,17 @@ fn scenes() -> Vec<(&'static str, Scene)> {
     far += &point(Vec3::new(1e12, 0.0, 0.0), 1e6);
     far += &point(Vec3::new(0.1, 0.0, 0.0), 1e-6);
     let of_all_kinds = [spot, sky, sun, mesh, &cube, &ball, &pipe, &disk, &black].concat();
+    // hc_e03: triangles without area, and one that is there twice, beside good ones.
+    let file =
+        std::env::temp_dir().join(format!("lucerna-flat-{}-{:?}.obj", std::process::id(), std::thread::current().id()));
+    let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 2 0 0\nv 0 0 1\nf 1 2 4\nf 1 2 3\nf 1 1 2\nf 1 2 3\nf 1 2 5\nf 3 3 3\n";
+    std::fs::write(&file, obj).expect("a temporary file");
+    let name = file.display();
+    let flat = format!("<shape type='obj'><string name='filename' value='{name}'/><emitter type='area'/></shape>");
+    let flat = scene(&flat);
+    std::fs::remove_file(&file).expect("the temporary file");
     vec![
+        ("flat triangles", flat),
         ("crowd", scene(&crowd(60))),
         ("all kinds", scene(&of_all_kinds)),
         ("one light", scene(&disk)),

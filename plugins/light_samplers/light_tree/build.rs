@@ -223,3 +223,112 @@ fn within(node: &Node, child: &Node) -> Result<(), String> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lucerna_core::interfaces::{Light, LightBounds, LightSelection, LightVertex};
+    use lucerna_core::sampling::Pcg32;
+    use lucerna_core::scene::EmitterId;
+    use std::f32::consts::FRAC_PI_2;
+
+    /// A tree over lights of one emitter.
+    fn tree(clusters: &[Cluster]) -> Tree {
+        let (nodes, trails) = build(clusters);
+        let lights = (0..clusters.len() as u32).map(|part| Light { emitter: EmitterId(0), part: Some(part) }).collect();
+        let first = vec![0, clusters.len() as u32];
+        Tree { nodes, lights, first, trails, far: None, far_of: Vec::new(), p_far: 0.0 }
+    }
+
+    fn light(p: Vec3, axis: Vec3, intensity: f32) -> Cluster {
+        let bounds = Aabb::of_points([p, p + Vec3::splat(1e-3)]);
+        Cluster::of_light(&LightBounds { bounds, axis, theta_o: 0.0, theta_e: FRAC_PI_2, intensity }, 1.0)
+    }
+
+    fn random(pcg: &mut Pcg32) -> Vec3 {
+        Vec3::new(pcg.next_f32(), pcg.next_f32(), pcg.next_f32()) - 0.5
+    }
+
+    /// Lights that tempt a builder to cut off one at a time: all in one place, in a line, each ten times as far as the
+    /// one before, each ten times as strong.
+    #[test]
+    fn no_way_is_too_long_and_every_light_has_one() {
+        let mut pcg = Pcg32::new(6, 1);
+        let hundred_thousand = 100_000;
+        let spread =
+            (0..hundred_thousand).map(|_| light(random(&mut pcg), random(&mut pcg).normalize(), 1.0)).collect();
+        let pile = vec![light(Vec3::ONE, Vec3::X, 1.0); hundred_thousand];
+        let line = (0..5000).map(|i| light(Vec3::X * i as f32, Vec3::Y, 1.0)).collect();
+        let farther = (0..70).map(|i| light(Vec3::X * 10f32.powi(i % 38 - 19), Vec3::Z, 1.0)).collect();
+        let stronger = (0..70).map(|i| light(Vec3::X * i as f32, Vec3::Z, 10f32.powi(i % 70 - 35))).collect();
+        let one = vec![light(Vec3::ONE, Vec3::X, 1.0)];
+        let cases: [(&str, Vec<Cluster>); 6] = [
+            ("spread", spread),
+            ("pile", pile),
+            ("line", line),
+            ("farther", farther),
+            ("stronger", stronger),
+            ("one", one),
+        ];
+        for (name, clusters) in &cases {
+            let tree = tree(clusters);
+            assert_eq!(validate(&tree), Ok(()), "{name}");
+            let longest = tree.trails.iter().map(|trail| 63 - trail.leading_zeros()).max();
+            assert!(longest <= Some(DEEPEST), "{name}: {longest:?}");
+            for _ in 0..200 {
+                let from = LightVertex { p: random(&mut pcg) * 3.0, n: random(&mut pcg).normalize() };
+                if let Some((light, pmf)) = tree.choose(&from, f64::from(pcg.next_f32())) {
+                    assert_eq!(tree.pmf(&from, light), pmf, "{name}");
+                }
+            }
+        }
+        // Near lights are found: 3 % of them are this near, and bring about a third of the light.
+        let (_, spread) = &cases[0];
+        let (tree, mut near) = (tree(spread), 0);
+        for i in 0..1000 {
+            let from = LightVertex { p: spread[i * 7].bounds.min - spread[i * 7].axis * -0.01, n: Vec3::ZERO };
+            let Some((light, _)) = tree.choose(&from, f64::from(pcg.next_f32())) else { continue };
+            near += u32::from(spread[light.part.unwrap_or(0) as usize].bounds.min.distance(from.p) < 0.2);
+        }
+        assert!(near > 150, "{near}");
+    }
+
+    #[test]
+    fn the_same_tree_for_any_number_of_threads() {
+        let mut pcg = Pcg32::new(6, 1);
+        let clusters: Vec<_> =
+            (0..50_000).map(|_| light(random(&mut pcg), random(&mut pcg).normalize(), pcg.next_f32())).collect();
+        let built = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            pool.install(|| build(&clusters))
+        };
+        let (one, three) = (built(1), built(3));
+        assert!(one.1 == three.1);
+        let bits = |nodes: &[Node]| {
+            let of = |n: &Node| {
+                (n.min.map(f32::to_bits), n.axis.to_array().map(f32::to_bits), n.intensity.to_bits(), n.next)
+            };
+            nodes.iter().map(of).collect::<Vec<_>>()
+        };
+        assert!(bits(&one.0) == bits(&three.0));
+    }
+
+    /// What is wrong in a tree is told.
+    #[test]
+    fn validation_finds_damage() {
+        let mut pcg = Pcg32::new(6, 1);
+        let clusters: Vec<_> = (0..100).map(|_| light(random(&mut pcg), random(&mut pcg).normalize(), 1.0)).collect();
+        let damages: [fn(&mut Tree); 5] = [
+            |tree| tree.nodes[5].max = [9.0; 3],
+            |tree| tree.nodes[7].axis = -tree.nodes[7].axis,
+            |tree| tree.nodes[9].intensity = 1e9,
+            |tree| tree.trails.swap(3, 4),
+            |tree| tree.trails[3] = 0,
+        ];
+        for (i, damage) in damages.into_iter().enumerate() {
+            let mut tree = tree(&clusters);
+            damage(&mut tree);
+            assert!(validate(&tree).is_err(), "{i}");
+        }
+    }
+}

@@ -118,7 +118,9 @@ impl Seen {
         if !(distance2 < 1e37 && radius2 < 1e37) {
             return 1e-37;
         }
-        let falloff = 1.0 / f64::from(distance2.max(radius2).max(f32::MIN_POSITIVE));
+        // The mean of 1/d² over a ball of radius R is 3/R² in its middle and 1/d² far away; a box is like a ball with
+        // R² of half its squared half diagonal.
+        let falloff = 1.0 / f64::from((distance2 + radius2 * (1.0 / 6.0)).max(f32::MIN_POSITIVE));
         if distance2 <= radius2 * (1.0 + SLACK) {
             return falloff;
         }
@@ -180,7 +182,7 @@ mod tests {
         assert!(proper > 500);
     }
 
-    /// The importance is never less than what a point of the light could bring, but for the clamped distance.
+    /// Nor has it one that is out of proportion to what a point of the cluster brings.
     #[test]
     fn no_lit_vertex_has_importance_zero() {
         let mut pcg = Pcg32::new(4, 1);
