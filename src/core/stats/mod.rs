@@ -3,9 +3,11 @@
 pub mod agreement;
 pub mod chi2;
 pub mod figures;
+pub mod flip;
 pub mod images;
 mod measured;
 pub mod metrics;
+pub mod ranks;
 pub mod student;
 
 pub use measured::{Measured, TILE};
