@@ -25,7 +25,9 @@ impl Store {
         let path = self.path(subject, &format!("{spp} {seed}"));
         let about: Value = serde_json::from_slice(&std::fs::read(path.with_extension("json")).ok()?).ok()?;
         let image = exr::read(&path.with_extension("exr"), &ReadLimits::default()).ok()?.image;
-        Some(Shot { spp, seconds: about["seconds"].as_f64()?, image })
+        let number = |name: &str| about[name].as_f64();
+        let of = about["of"].as_u64().and_then(|v| u32::try_from(v).ok()).unwrap_or(spp);
+        Some(Shot { spp, of, seconds: number("seconds")?, cpu: number("cpu"), memory: number("peak_mib"), image })
     }
 
     /// Keeps a run. It appears as a whole or not at all.
@@ -35,7 +37,10 @@ impl Store {
     pub fn keep(&self, subject: &str, seed: u32, shot: &Shot) -> Result<(), String> {
         let path = self.path(subject, &format!("{} {seed}", shot.spp));
         write_exr(&path.with_extension("exr"), &shot.image)?;
-        write_json(&path.with_extension("json"), &json!({ "spp": shot.spp, "seed": seed, "seconds": shot.seconds }))
+        let about = json!({
+            "spp": shot.spp, "of": shot.of, "seed": seed, "seconds": shot.seconds, "cpu": shot.cpu, "peak_mib": shot.memory,
+        });
+        write_json(&path.with_extension("json"), &about)
     }
 
     /// What is planned for a subject, if it is known: a list of numbers of samples per pixel.
@@ -53,7 +58,7 @@ impl Store {
     }
 
     fn path(&self, subject: &str, what: &str) -> PathBuf {
-        let key = format!("{subject} {what} {} {}", rayon::current_num_threads(), super::machine());
+        let key = format!("{subject} {what} {} {}", rayon::current_num_threads(), super::facts::processor());
         self.0.join(&digest(key.as_bytes())[..32])
     }
 }
