@@ -9,6 +9,7 @@ use lucerna::compare::turn::Place;
 use lucerna::compare::{Budgets, Options, compare, page};
 use lucerna::core::scene::Registry;
 use serde_json::Value;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -58,17 +59,22 @@ fn run(registry: &Registry, folder: &Path, methods: &[&str], options: &Options) 
     compare(registry, &folder.join("scene.xml"), &methods, options, &mut |_| {}).expect("a comparison")
 }
 
-/// Runs the program in a folder.
-fn lucerna(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_lucerna"))
+/// The program in a folder.
+fn command(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lucerna"));
+    command
         .arg("compare")
         .args(arguments)
         .args(["--cache", "cache", "-o", "report"])
         .env("LUCERNA_REFERENCE_PYTHON", "/nowhere/python")
         .current_dir(folder)
-        .stdin(Stdio::null())
-        .output()
-        .expect("the program starts");
+        .stdin(Stdio::null());
+    command
+}
+
+/// Runs it.
+fn lucerna(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
+    let output = command(folder, arguments).output().expect("the program starts");
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("messages are UTF-8");
     (output.status.code().expect("no signal"), text(output.stdout), text(output.stderr))
 }
@@ -143,6 +149,91 @@ fn a_killed_comparison_goes_on() {
     assert_eq!(column(&before, 5), column(&csv(), 5));
     let (old, new) = (column(&before, 4), column(&csv(), 4));
     assert!(old.iter().zip(&new).filter(|(a, b)| a != b).count() <= 2);
+}
+
+/// The same with a real kill: what was whole then is not rendered again, and the errors are those of a run that was left alone.
+#[test]
+fn a_real_kill_loses_one_turn() {
+    let arguments = ["scene.xml", "--spp", "256", "--seeds", "6", "--reference-seconds", "2", "-m", "path", "direct"];
+    let [killed, left_alone] = ["killed", "left_alone"].map(temporary);
+    let mut child = command(&killed, &arguments).stderr(Stdio::piped()).spawn().expect("the program starts");
+    let lines = BufReader::new(child.stderr.take().expect("messages")).lines();
+    assert_eq!(lines.map_while(Result::ok).filter(|line| line.contains(": run ")).take(3).count(), 3);
+    child.kill().expect("it still ran");
+    child.wait().expect("it ends");
+    let (code, _, rest) = lucerna(&killed, &arguments);
+    assert_eq!(code, 0, "{rest}");
+    let runs = rest.lines().filter(|line| line.contains(": run ")).count();
+    assert!(runs <= 9, "{runs} of 12 runs again: {rest}");
+    let (code, _, said) = lucerna(&left_alone, &arguments);
+    assert_eq!(code, 0, "{said}");
+    let measured = |folder: &Path| {
+        let document = std::fs::read(folder.join("report/results.json")).expect("results");
+        let document: Value = serde_json::from_slice(&document).expect("JSON");
+        let methods = document["scenes"][0]["methods"].as_array().expect("methods").clone();
+        let points = methods.iter().flat_map(|m| m["points"].as_array().expect("points").clone());
+        // What does not hang on the reference, whose time was short.
+        points.map(|p| (p["spp"].clone(), p["variance"].clone())).collect::<Vec<_>>()
+    };
+    assert_eq!(measured(&killed), measured(&left_alone));
+}
+
+/// Each is a line: the disk is full while runs are kept, and while the report is written.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_a_line() {
+    let folder = temporary("full");
+    let arguments = ["scene.xml", "-q", "--spp", "2", "--seeds", "2", "-m", "path", "direct"];
+    // No file may be longer than a block, as if the disk was full then.
+    let limited = Command::new("sh")
+        .args(["-c", "trap '' XFSZ; ulimit -f 1; exec \"$@\"", "sh", env!("CARGO_BIN_EXE_lucerna"), "compare"])
+        .args(arguments)
+        .args(["--cache", "cache", "-o", "report"])
+        .current_dir(&folder)
+        .output()
+        .expect("a shell");
+    let stderr = String::from_utf8_lossy(&limited.stderr).into_owned();
+    assert_eq!((limited.status.code(), stderr.lines().count()), (Some(2), 1), "{stderr}");
+    assert!(stderr.contains("report/runs/") && stderr.contains("too large"), "{stderr}");
+    assert_eq!(lucerna(&folder, &arguments).0, 0);
+    for file in ["results.json", "index.html", "data/0-1.js"] {
+        let path = folder.join("report").join(file);
+        std::fs::remove_file(&path).expect("a report");
+        std::os::unix::fs::symlink("/dev/full", &path).expect("a link");
+        let (code, _, stderr) = lucerna(&folder, &arguments);
+        assert_eq!((code, stderr.lines().count()), (2, 1), "{stderr}");
+        assert!(stderr.contains(file) && stderr.contains("No space left"), "{stderr}");
+        std::fs::remove_file(&path).expect("a link");
+    }
+    assert_eq!(lucerna(&folder, &arguments).0, 0);
+}
+
+/// A pixel that is not finite is left out and told; a reference without any that is, is a reason to fail.
+#[test]
+fn pixels_that_are_not_finite_are_told() {
+    let folder = temporary("nan");
+    let mut reference = lucerna::core::image::Image::new(24, 20, &["R", "G", "B"]);
+    reference.data.fill(0.5);
+    reference.data[30] = f32::NAN;
+    let arguments = ["scene.xml", "--spp", "4", "--seeds", "3", "-m", "path", "--reference", "given.exr"];
+    let write = |image: &lucerna::core::image::Image| {
+        lucerna::core::image::exr::write(&folder.join("given.exr"), image, &Default::default()).expect("written");
+    };
+    write(&reference);
+    let (code, _, said) = lucerna(&folder, &arguments);
+    assert_eq!(code, 0, "{said}");
+    let page = std::fs::read_to_string(folder.join("report/index.html")).expect("a page");
+    assert!(page.contains("3 pixels of all runs are not finite and were left out"));
+    let document = std::fs::read(folder.join("report/results.json")).expect("results");
+    let document: Value = serde_json::from_slice(&document).expect("JSON");
+    let point = &document["scenes"][0]["methods"][0]["points"][2];
+    assert_eq!(point["left_out"], 3);
+    assert!(point["flip_hdr"]["value"].as_f64().is_some_and(|v| v > 0.0 && v < 1.0), "{point}");
+    reference.data.fill(f32::NAN);
+    write(&reference);
+    let (code, stdout, said) = lucerna(&folder, &arguments);
+    assert_eq!(code, 2, "{stdout}{said}");
+    assert!(stdout.contains("failed: no pixel is finite"), "{stdout}{said}");
 }
 
 #[test]
@@ -252,7 +343,8 @@ fn the_page_works_in_a_browser() {
     };
     let folder = temporary("browser");
     let options = options(&folder, &[4], 2);
-    let found = [run(&lucerna::builtin(), &folder, &["path", "direct"], &options)];
+    // Twice: the page of a scene, and one that sums up.
+    let found = [0, 1].map(|_| run(&lucerna::builtin(), &folder, &["path", "direct"], &options));
     page::write(&found, &[], &options, &Facts::default()).expect("a report");
     let dump = |page: &str, size: &str| {
         let output = Command::new(browser)
@@ -331,7 +423,9 @@ fn the_page_works_in_a_browser() {
     let index = std::fs::read_to_string(options.output.join("index.html")).expect("a page");
     // Pages in frames of a phone's width to that of a large screen tell whether they are wider than that.
     let measure = "<script>parent.postMessage('wide ' + (document.documentElement.scrollWidth > innerWidth), '*')</script></body>";
-    for (name, page) in [("index", &index), ("viewer", &viewer)] {
+    let scene = std::fs::read_to_string(options.output.join("scene-2.html")).expect("a page");
+    assert!(scene.contains("viewer.html#scene=1&amp;place=2") && index.contains("href=\"scene-2.html\""));
+    for (name, page) in [("index", &index), ("scene", &scene), ("viewer", &viewer)] {
         std::fs::write(options.output.join("width.html"), page.replace("</body>", measure)).expect("written");
         for width in [360, 768, 1280, 2560] {
             let frame = format!(

@@ -122,19 +122,23 @@ pub fn colour(image: &Image) -> Result<(Vec<String>, Vec<f32>), String> {
     Ok((names, pixels.flat_map(|pixel| order.iter().map(|&c| pixel[c])).collect()))
 }
 
-/// Samples per pixel a second, from a trial of about this many seconds.
+/// Samples per pixel a second, from a trial of about this many seconds: what runs of more and more samples come to. It has
+/// settled when more samples make it no faster; until then, what every run has to do once is much of its time.
 fn rate(subject: &Subject, seconds: f64) -> Result<f64, String> {
     const MOST: f64 = (1 << 22) as f64;
-    let mut spp = 1.0;
+    const SETTLED: f64 = 1.3;
+    let (mut spp, mut before) = (1.0, 0.0);
     loop {
         let shot = subject.render(&[subject.counts_up_to(spp as u32)], u32::MAX)?.pop().ok_or("no picture")?;
         let took = shot.seconds.max(1e-6);
+        let found = f64::from(shot.spp) / took;
         // Four times as many, at least, are another number for samplers that round to powers of four, too.
         let next = (f64::from(shot.spp) * (seconds / took).clamp(4.0, 32.0)).min(MOST);
-        if took >= 0.5 * seconds || subject.counts_up_to(next as u32) <= shot.spp {
-            return Ok(f64::from(shot.spp) / took);
+        let is_last = took >= 0.5 * seconds && found < SETTLED * before || took >= 2.0 * seconds;
+        if is_last || subject.counts_up_to(next as u32) <= shot.spp {
+            return Ok(found.max(before));
         }
-        spp = next;
+        (spp, before) = (next, found);
     }
 }
 

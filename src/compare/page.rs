@@ -218,10 +218,12 @@ fn section(scene: &SceneResult, number: usize, options: &Options) -> Result<Stri
     let budget = names.len().saturating_sub(1);
     let mut html = format!(
         "<section><h2>{name}</h2>\n<p class=\"lead\">{}</p>\n\
-         <p class=\"soft\">{width} × {height} pixels. Reference: {}; {noise}.</p>\n{}\n{}",
+         <p class=\"soft\">{width} × {height} pixels. Reference: {}; {noise}.</p>\n\
+         <div class=\"plots\"><div>{}</div><div>{}</div></div>\n{}",
         lead(scene, options),
         escape(&truth.source),
         forest(scene, budget),
+        over_time(scene),
         table::summary(scene, budget, options),
     );
     for (budget, name) in names.iter().enumerate().rev() {
@@ -230,11 +232,10 @@ fn section(scene: &SceneResult, number: usize, options: &Options) -> Result<Stri
     }
     let samples = |p: &Point| f64::from(p.spp);
     let over_samples = plot(scene, "relMSE over samples per pixel", "samples per pixel", samples);
-    let _ = write!(html, "<h3>Error as time and samples grow</h3>{}", legend(scene));
-    let _ = write!(
+    let _ = writeln!(
         html,
-        "<div class=\"plots\"><div>{}</div><div>{over_samples}</div></div>\n{}",
-        over_time(scene),
+        "<details><summary>Error as samples grow, and slopes</summary>{}<div class=\"plots\"><div>{over_samples}</div><div>{}</div></div></details>",
+        legend(scene),
         slopes(scene)
     );
     html.push_str(&crops::crops(scene, number)?);
@@ -297,6 +298,12 @@ fn lead(scene: &SceneResult, options: &Options) -> String {
     text
 }
 
+/// A method's name, with places where lines may break.
+fn label(name: &str) -> String {
+    let breaks = |text: String, sign: &str| text.replace(sign, &format!("{sign}<wbr>"));
+    [":", "=", ","].iter().fold(escape(name), |text, sign| breaks(text, sign))
+}
+
 /// The marker of a method, as in the plots.
 fn key(number: usize) -> String {
     format!(
@@ -339,13 +346,13 @@ fn slopes(scene: &SceneResult) -> String {
     let rows = working(scene).map(|(i, method)| {
         let [samples, seconds] = method.slopes().map(text);
         let points = if method.is_sequence { "of one run" } else { "each its own run" };
-        let name = escape(&method.method.name);
+        let name = label(&method.method.name);
         format!("<tr><th>{}{name}</th><td>{samples}</td><td>{seconds}</td><td>{points}</td></tr>", key(i))
     });
     format!(
-        "<details><summary>Slopes of log MSE</summary><div class=\"scroll\"><table><caption>−1 is that of independent samples; \
+        "<div class=\"scroll\" tabindex=\"0\"><table><caption>Slopes of log MSE: −1 is that of independent samples; \
          a flat curve is one that bias, or the reference’s noise, holds up</caption><thead><tr><th>method</th><th>over log samples</th>\
-         <th>over log seconds</th><th>points</th></tr></thead><tbody>{}</tbody></table></div></details>\n",
+         <th>over log seconds</th><th>points</th></tr></thead><tbody>{}</tbody></table></div>\n",
         rows.collect::<String>()
     )
 }

@@ -246,3 +246,65 @@ impl SceneResult {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A method whose relMSE is `scale / seconds` in every run, up to 8 seconds; runs differ in speed by a percent.
+    fn falling(scale: f64) -> MethodResult {
+        let mut result = MethodResult::new(Method::of_text("path").unwrap());
+        for spp in [1, 2, 4, 8] {
+            let seconds: Vec<f64> = [0.99, 1.0, 1.01].map(|speed| speed * f64::from(spp)).to_vec();
+            let of = |seconds: &f64| {
+                let rel_mse = scale / seconds;
+                let (mse, rest) = (rel_mse, [0.0; 4]);
+                let [rel_mse_trimmed, mape, smape, mean_difference] = rest;
+                Errors { mse, rel_mse, rel_mse_trimmed, mape, smape, mean_difference, fireflies: 0, left_out: 0 }
+            };
+            let errors = seconds.iter().map(of).collect();
+            result.points.push(Point { spp, of: 8, seconds, errors, ..Point::default() });
+        }
+        result.stops = vec![3];
+        result
+    }
+
+    #[test]
+    fn the_time_to_an_error() {
+        let method = falling(0.6);
+        let Some(Reached::After(found)) = method.time_to(0.2) else { panic!("it is reached after 3 seconds") };
+        assert!((found.value - 3.0).abs() < 0.01 && !found.excludes(3.0), "{found:?}");
+        let [low, high] = found.bounds.unwrap();
+        assert!(high - low < 0.2, "{found:?}");
+        // What the last point has is reached there; less is not; more than the first has is there from the start.
+        let last = method.last().unwrap().mean(|e| e.rel_mse).value;
+        assert!(matches!(method.time_to(last), Some(Reached::After(t)) if (t.value - 8.0).abs() < 0.01));
+        assert_eq!(method.time_to(0.99 * last), Some(Reached::NotWithin(8.0)));
+        assert!(matches!(method.time_to(5.0), Some(Reached::After(t)) if (t.value - 1.0).abs() < 1e-9));
+        assert_eq!(MethodResult { points: method.points[..1].to_vec(), ..method }.time_to(0.1), None);
+    }
+
+    #[test]
+    fn ratios_know_who_is_better() {
+        let truth = Truth {
+            values: Vec::new(),
+            size: [0, 0],
+            channels: Vec::new(),
+            noise: None,
+            source: String::new(),
+            spp: 0,
+            reached: None,
+        };
+        let mut slower = falling(0.3);
+        slower.points.iter_mut().for_each(|p| p.cpu = p.seconds.iter().map(|s| 1.5 * s).collect());
+        let mut base = falling(0.6);
+        base.points.iter_mut().for_each(|p| p.cpu = p.seconds.clone());
+        let scene = SceneResult { scene: PathBuf::new(), truth, methods: vec![base, slower], baseline: 0 };
+        let gain = scene.gain(1, 0, |e| e.rel_mse).unwrap();
+        assert!((gain.value - 2.0).abs() < 1e-9, "half of the error in the same time: {gain:?}");
+        assert!((scene.processor_slowdown(1, 0).unwrap().value - 1.5).abs() < 1e-9);
+        assert!((scene.slowdown(1, 0).unwrap().value - 1.0).abs() < 1e-9);
+        assert_eq!(scene.target(Some(0.5)), Some(0.5));
+        assert!((scene.target(None).unwrap() - 0.075).abs() < 1e-4);
+    }
+}

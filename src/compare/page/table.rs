@@ -1,6 +1,6 @@
 //! The tables of the report.
 
-use super::{digits, key};
+use super::{digits, key, label};
 use crate::check::page::escape;
 use crate::compare::Options;
 use crate::compare::results::{MethodResult, Point, Reached, SceneResult};
@@ -103,7 +103,7 @@ pub fn overview(scenes: &[SceneResult], budget: usize, link: impl Fn(usize) -> S
     html.push_str("<th>all<small>geometric mean</small></th></tr></thead>\n<tbody>\n");
     let names: Vec<&str> = scenes[0].methods.iter().map(|m| m.method.name.as_str()).collect();
     for (i, name) in names.iter().enumerate() {
-        let _ = write!(html, "<tr><th>{}{}</th>", key(i), escape(name));
+        let _ = write!(html, "<tr><th>{}{}</th>", key(i), label(name));
         let (mut logs, mut whole) = (0.0, true);
         for scene in scenes {
             let gain = scene.gain(i, budget, |e| e.rel_mse);
@@ -166,7 +166,7 @@ fn rows(
 fn row_head(number: usize, method: &MethodResult, is_baseline: bool) -> String {
     let base = if is_baseline { "<small>baseline</small>" } else { "" };
     let what = escape(&method.method.describe());
-    format!("<tr><th title=\"{what}\">{}{}{base}</th>", key(number), escape(&method.method.name))
+    format!("<tr><th title=\"{what}\">{}{}{base}</th>", key(number), label(&method.method.name))
 }
 
 /// A ratio, coloured where its interval excludes 1.
@@ -198,7 +198,7 @@ fn plain(found: Interval) -> String {
 }
 
 fn percent(value: f64) -> String {
-    format!("{:+.2} %", 100.0 * value).replace('-', "−")
+    format!("{:+.2}", 100.0 * value).replace('-', "−")
 }
 
 fn nothing() -> String {
