@@ -86,11 +86,13 @@ fn ask(program: &Path, arguments: &[OsString], turn: &Turn) -> Result<Answer, St
     let child = Command::new(program)
         .args(arguments)
         .arg(format!("--turn={text}"))
-        .stdin(Stdio::null())
+        .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn();
     let mut child = child.map_err(|e| format!("{}: {e}", program.display()))?;
+    // Closed with this process, however that ends, which ends the other.
+    let _alive = child.stdin.take();
     let (output, errors) = (child.stdout.take().ok_or("no output")?, child.stderr.take().ok_or("no errors")?);
     // What it complains about is read at the same time, so that neither side waits for the other.
     let complaint = std::thread::spawn(move || {
@@ -163,6 +165,11 @@ fn read(mut output: impl BufRead) -> Result<Answer, Option<String>> {
 
 /// The other side: takes the turn that `text` says and answers on standard output. Whether that worked is in the answer.
 pub fn serve(registry: &Registry, methods: &Methods, options: &Options, text: &str) {
+    // Nobody waits for the answer when the input ends. (Nothing is ever sent.)
+    std::thread::spawn(|| {
+        let _ = std::io::stdin().read(&mut [0]);
+        std::process::exit(1);
+    });
     let mut output = BufWriter::new(std::io::stdout());
     if let Err(why) = answer(registry, methods, options, text, &mut output) {
         let _ = writeln!(output, "{}", json!({ "error": why }));

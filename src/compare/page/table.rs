@@ -10,15 +10,14 @@ use std::fmt::Write as _;
 
 /// What a reader looks for first: who is better, by how much, and is it right?
 pub fn summary(scene: &SceneResult, budget: usize, options: &Options) -> String {
-    let base = escape(&scene.methods[scene.baseline].method.name);
     let target = scene.target(options.target);
     let until = target.map_or_else(|| "an error".to_owned(), |error| format!("relMSE {}", digits(error)));
     let head = [
-        format!("efficiency<small>relMSE, against {base}</small>"),
-        format!("efficiency<small>MSE, against {base}</small>"),
+        "efficiency<small>relMSE, over the baseline’s</small>".to_owned(),
+        "efficiency<small>MSE, over the baseline’s</small>".to_owned(),
         format!("time to<small>{until}</small>"),
-        format!("processor time<small>a sample, against {base}</small>"),
-        "mean<small>against the reference</small>".to_owned(),
+        "processor time<small>a sample, over the baseline’s</small>".to_owned(),
+        "mean<small>over the reference’s, in %</small>".to_owned(),
         "relMSE".to_owned(),
         "FLIP<small>HDR</small>".to_owned(),
     ];
@@ -63,7 +62,7 @@ pub fn measures(scene: &SceneResult, budget: usize, name: &str) -> String {
         "fireflies",
         "1 / (relMSE · s)",
         "1 / (MSE · s)",
-        "wall time<small>a sample, against the baseline</small>",
+        "wall time<small>a sample, over the baseline’s</small>",
     ];
     rows(scene, budget, name, &head.map(str::to_owned), |i, point| {
         let optional = |found: Option<Interval>| found.map_or_else(nothing, plain);
