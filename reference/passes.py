@@ -8,8 +8,9 @@ Alone, it reads one job from standard input, as JSON:
 (or an empty line, which asks for nothing but the version) and answers on standard output: one line of JSON with
 `mitsuba` (its version), `variant`, `width`, `height`, `channels`, `notes`, or with `error`; and for each seed a little-endian
 double (seconds) and the picture in float32, row-major from the top left corner, channels interleaved. An empty variant is
-the fastest one that works here. `spp` is that of all pictures, or of each; in the second case time matters, and what took
-less than two seconds is rendered twice, the second time without compiling. `threads` may be left out.
+the fastest one that works here. `spp` is that of all pictures, or of each; in the second case time matters: what took
+less than two seconds is rendered twice, the second time without compiling, and a last line of JSON has `cpu`, the seconds of
+processor time of each picture, and `peak_mib`, the most memory of the process, if the system tells. `threads` may be left out.
 """
 import json
 import os
@@ -92,6 +93,21 @@ def open_job(job):
         return Job(job["scene"], variant, job["defines"], job["size"], threads=job.get("threads")), variant, notes
 
 
+def measured(work):
+    """What `work` gives, and the seconds of the clock and of all processors it took."""
+    started, before = time.perf_counter(), time.process_time()
+    result = work()
+    return result, time.perf_counter() - started, time.process_time() - before
+
+
+def peak_memory():
+    try:
+        with open("/proc/self/status") as status:
+            return next(int(line.split()[1]) / 1024 for line in status if line.startswith("VmHWM:"))
+    except (OSError, StopIteration):
+        return None
+
+
 def serve():
     answer, sys_out = os.fdopen(os.dup(1), "wb"), sys.stderr
     os.dup2(2, 1)  # what the package prints is no answer
@@ -108,23 +124,22 @@ def serve():
             return say(mitsuba=mi.__version__)
         job = json.loads(line)
         opened, variant, notes = open_job(job)
-        timed = isinstance(job["spp"], list)
+        timed, cpu = isinstance(job["spp"], list), []
         counts = job["spp"] if timed else [job["spp"]] * len(job["seeds"])
         for index, (spp, seed) in enumerate(zip(counts, job["seeds"])):
             if index == 0 and not variant.startswith("scalar"):
                 opened.render(1, 999_999)  # compiles, which is not rendering time
-            started = time.perf_counter()
-            image = opened.render_in_parts(spp, seed)
-            seconds = time.perf_counter() - started
+            image, seconds, processor = measured(lambda: opened.render_in_parts(spp, seed))
             if timed and seconds < 2:
-                started = time.perf_counter()
-                image = opened.render_in_parts(spp, seed)
-                seconds = time.perf_counter() - started
+                image, seconds, processor = measured(lambda: opened.render_in_parts(spp, seed))
+            cpu.append(processor)
             if index == 0:
                 say(mitsuba=mi.__version__, variant=variant, width=image.shape[1], height=image.shape[0],
                     channels=opened.channels(), notes=notes)
             answer.write(struct.pack("<d", seconds) + image.astype("<f4").tobytes())
             answer.flush()
+        if timed:
+            say(cpu=cpu, peak_mib=peak_memory())
     except Exception as error:
         lines = [text.strip() for text in str(error).splitlines() if text.strip()] or [type(error).__name__]
         say(error=" ".join(lines)[:500])

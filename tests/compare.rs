@@ -1,17 +1,17 @@
 //! `lucerna compare` as a user meets it: does it find what was planted, does it go on after it was killed, does it show
 //! what failed, and does its report open in a browser?
 
+use lucerna::compare::facts::Facts;
 use lucerna::compare::method::Methods;
-use lucerna::compare::results::{SceneResult, to_csv, to_json};
+use lucerna::compare::results::SceneResult;
+use lucerna::compare::tables::{to_csv, to_json};
+use lucerna::compare::turn::Place;
 use lucerna::compare::{Budgets, Options, compare, page};
-use lucerna::core::interfaces::Integrator;
-use lucerna::core::render::{RenderContext, RenderError, Report};
-use lucerna::core::scene::{Built, Constructor, ObjectKind, Plugin, Properties, Registry};
+use lucerna::core::scene::Registry;
 use serde_json::Value;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::Arc;
-use std::time::{Duration, Instant};
 
 /// A floor under a lamp, whose power is a parameter.
 const SCENE: &str = r#"<scene version="3.0.0">
@@ -43,6 +43,8 @@ fn options(folder: &Path, spp: &[u32], seeds: u32) -> Options {
         seeds,
         seed: 0,
         no_curves: false,
+        target: None,
+        place: Place::Here,
         reference: None,
         reference_method: "path:sampler=sobol".to_owned(),
         reference_seconds: 20.0,
@@ -57,17 +59,22 @@ fn run(registry: &Registry, folder: &Path, methods: &[&str], options: &Options) 
     compare(registry, &folder.join("scene.xml"), &methods, options, &mut |_| {}).expect("a comparison")
 }
 
-/// Runs the program in a folder.
-fn lucerna(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_lucerna"))
+/// The program in a folder.
+fn command(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lucerna"));
+    command
         .arg("compare")
         .args(arguments)
         .args(["--cache", "cache", "-o", "report"])
         .env("LUCERNA_REFERENCE_PYTHON", "/nowhere/python")
         .current_dir(folder)
-        .stdin(Stdio::null())
-        .output()
-        .expect("the program starts");
+        .stdin(Stdio::null());
+    command
+}
+
+/// Runs it.
+fn lucerna(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
+    let output = command(folder, arguments).output().expect("the program starts");
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("messages are UTF-8");
     (output.status.code().expect("no signal"), text(output.stdout), text(output.stderr))
 }
@@ -91,45 +98,6 @@ fn a_planted_bias_of_one_percent_is_found() {
     }
 }
 
-/// `path` that waits for as long as it has rendered, and a little longer.
-struct Slow(Arc<dyn Integrator>);
-
-impl Integrator for Slow {
-    fn render(&self, cx: &mut RenderContext<'_>) -> Result<Report, RenderError> {
-        let started = Instant::now();
-        let report = self.0.render(cx)?;
-        std::thread::sleep(started.elapsed() + Duration::from_millis(2));
-        Ok(report)
-    }
-}
-
-fn slow(p: &Properties<'_>) -> Built<dyn Integrator> {
-    let registry = lucerna::builtin();
-    let path = registry.find(ObjectKind::Integrator, "path").expect("path");
-    match path.build {
-        Constructor::Integrator(build) => Ok(Arc::new(Slow(build(p)?))),
-        _ => panic!("path is an integrator"),
-    }
-}
-
-#[test]
-fn a_planted_slowdown_is_found() {
-    let folder = temporary("slow");
-    let mut registry = lucerna::builtin();
-    let path = registry.find(ObjectKind::Integrator, "path").expect("path");
-    let plugin =
-        Plugin { name: "slow", aliases: &[], summary: "", params: path.params, build: Constructor::Integrator(slow) };
-    registry.add(plugin);
-    let found = run(&registry, &folder, &["path", "slow"], &options(&folder, &[32], 6));
-    let [path, slow] = [0, 1].map(|i| found.methods[i].last().expect("points").each(|e| e.mse));
-    assert_eq!(path, slow, "the same samples have the same error");
-    let slowdown = found.slowdown(1, 0).expect("times");
-    let gain = found.gain(1, 0, |e| e.mse).expect("times");
-    // At least twice the time; whatever else runs on the machine only adds to the interval.
-    assert!(slowdown.value > 1.5 && gain.value < 0.7, "{slowdown:?} {gain:?}");
-    assert!((slowdown.value * gain.value - 1.0).abs() < 1e-9, "{slowdown:?} {gain:?}");
-}
-
 /// The MSE of independent samples falls as 1 / N, and without bias it is all variance.
 #[test]
 fn errors_fall_as_they_must() {
@@ -139,7 +107,7 @@ fn errors_fall_as_they_must() {
     let slope = slope.expect("a slope");
     assert!((slope.value + 1.0).abs() < 0.06, "{slope:?}");
     let [path, direct] = [0, 1].map(|i| found.methods[i].last().expect("points").clone());
-    let share = |p: &lucerna::compare::results::Point| p.bias_squared.expect("seeds") / p.mean(|e| e.mse).value;
+    let share = |p: &lucerna::compare::results::Point| p.bias_squared.expect("seeds").value / p.mean(|e| e.mse).value;
     assert!(share(&path).abs() < 0.05, "{}", share(&path));
     // What `direct` leaves out is no noise.
     assert!(share(&direct) > 0.5 && found.is_biased(&direct) == Some(true), "{}", share(&direct));
@@ -181,6 +149,91 @@ fn a_killed_comparison_goes_on() {
     assert_eq!(column(&before, 5), column(&csv(), 5));
     let (old, new) = (column(&before, 4), column(&csv(), 4));
     assert!(old.iter().zip(&new).filter(|(a, b)| a != b).count() <= 2);
+}
+
+/// The same with a real kill: what was whole then is not rendered again, and the errors are those of a run that was left alone.
+#[test]
+fn a_real_kill_loses_one_turn() {
+    let arguments = ["scene.xml", "--spp", "256", "--seeds", "6", "--reference-seconds", "2", "-m", "path", "direct"];
+    let [killed, left_alone] = ["killed", "left_alone"].map(temporary);
+    let mut child = command(&killed, &arguments).stderr(Stdio::piped()).spawn().expect("the program starts");
+    let lines = BufReader::new(child.stderr.take().expect("messages")).lines();
+    assert_eq!(lines.map_while(Result::ok).filter(|line| line.contains(": run ")).take(3).count(), 3);
+    child.kill().expect("it still ran");
+    child.wait().expect("it ends");
+    let (code, _, rest) = lucerna(&killed, &arguments);
+    assert_eq!(code, 0, "{rest}");
+    let runs = rest.lines().filter(|line| line.contains(": run ")).count();
+    assert!(runs <= 9, "{runs} of 12 runs again: {rest}");
+    let (code, _, said) = lucerna(&left_alone, &arguments);
+    assert_eq!(code, 0, "{said}");
+    let measured = |folder: &Path| {
+        let document = std::fs::read(folder.join("report/results.json")).expect("results");
+        let document: Value = serde_json::from_slice(&document).expect("JSON");
+        let methods = document["scenes"][0]["methods"].as_array().expect("methods").clone();
+        let points = methods.iter().flat_map(|m| m["points"].as_array().expect("points").clone());
+        // What does not hang on the reference, whose time was short.
+        points.map(|p| (p["spp"].clone(), p["variance"].clone())).collect::<Vec<_>>()
+    };
+    assert_eq!(measured(&killed), measured(&left_alone));
+}
+
+/// Each is a line: the disk is full while runs are kept, and while the report is written.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_a_line() {
+    let folder = temporary("full");
+    let arguments = ["scene.xml", "-q", "--spp", "2", "--seeds", "2", "-m", "path", "direct"];
+    // No file may be longer than a block, as if the disk was full then.
+    let limited = Command::new("sh")
+        .args(["-c", "trap '' XFSZ; ulimit -f 1; exec \"$@\"", "sh", env!("CARGO_BIN_EXE_lucerna"), "compare"])
+        .args(arguments)
+        .args(["--cache", "cache", "-o", "report"])
+        .current_dir(&folder)
+        .output()
+        .expect("a shell");
+    let stderr = String::from_utf8_lossy(&limited.stderr).into_owned();
+    assert_eq!((limited.status.code(), stderr.lines().count()), (Some(2), 1), "{stderr}");
+    assert!(stderr.contains("report/runs/") && stderr.contains("too large"), "{stderr}");
+    assert_eq!(lucerna(&folder, &arguments).0, 0);
+    for file in ["results.json", "index.html", "data/0-1.js"] {
+        let path = folder.join("report").join(file);
+        std::fs::remove_file(&path).expect("a report");
+        std::os::unix::fs::symlink("/dev/full", &path).expect("a link");
+        let (code, _, stderr) = lucerna(&folder, &arguments);
+        assert_eq!((code, stderr.lines().count()), (2, 1), "{stderr}");
+        assert!(stderr.contains(file) && stderr.contains("No space left"), "{stderr}");
+        std::fs::remove_file(&path).expect("a link");
+    }
+    assert_eq!(lucerna(&folder, &arguments).0, 0);
+}
+
+/// A pixel that is not finite is left out and told; a reference without any that is, is a reason to fail.
+#[test]
+fn pixels_that_are_not_finite_are_told() {
+    let folder = temporary("nan");
+    let mut reference = lucerna::core::image::Image::new(24, 20, &["R", "G", "B"]);
+    reference.data.fill(0.5);
+    reference.data[30] = f32::NAN;
+    let arguments = ["scene.xml", "--spp", "4", "--seeds", "3", "-m", "path", "--reference", "given.exr"];
+    let write = |image: &lucerna::core::image::Image| {
+        lucerna::core::image::exr::write(&folder.join("given.exr"), image, &Default::default()).expect("written");
+    };
+    write(&reference);
+    let (code, _, said) = lucerna(&folder, &arguments);
+    assert_eq!(code, 0, "{said}");
+    let page = std::fs::read_to_string(folder.join("report/index.html")).expect("a page");
+    assert!(page.contains("3 pixels of all runs are not finite and were left out"));
+    let document = std::fs::read(folder.join("report/results.json")).expect("results");
+    let document: Value = serde_json::from_slice(&document).expect("JSON");
+    let point = &document["scenes"][0]["methods"][0]["points"][2];
+    assert_eq!(point["left_out"], 3);
+    assert!(point["flip_hdr"]["value"].as_f64().is_some_and(|v| v > 0.0 && v < 1.0), "{point}");
+    reference.data.fill(f32::NAN);
+    write(&reference);
+    let (code, stdout, said) = lucerna(&folder, &arguments);
+    assert_eq!(code, 2, "{stdout}{said}");
+    assert!(stdout.contains("failed: no pixel is finite"), "{stdout}{said}");
 }
 
 #[test]
@@ -244,7 +297,7 @@ fn tables_agree() {
     let folder = temporary("tables");
     let options = options(&folder, &[2, 8], 3);
     let found = [run(&lucerna::builtin(), &folder, &["path", "path:sampler=sobol"], &options)];
-    let document = to_json(&found, &[], &options, "lucerna compare");
+    let document = to_json(&found, &[], &options, &Facts::default());
     let csv = to_csv(&found, &options);
     let rows: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
     // 1, 2, 4 and 8 samples, three seeds, two methods.
@@ -290,8 +343,9 @@ fn the_page_works_in_a_browser() {
     };
     let folder = temporary("browser");
     let options = options(&folder, &[4], 2);
-    let found = [run(&lucerna::builtin(), &folder, &["path", "direct"], &options)];
-    page::write(&found, &[], &options, "lucerna compare scene.xml").expect("a report");
+    // Twice: the page of a scene, and one that sums up.
+    let found = [0, 1].map(|_| run(&lucerna::builtin(), &folder, &["path", "direct"], &options));
+    page::write(&found, &[], &options, &Facts::default()).expect("a report");
     let dump = |page: &str, size: &str| {
         let output = Command::new(browser)
             .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"])
@@ -313,37 +367,67 @@ fn the_page_works_in_a_browser() {
       const press = (key) => document.body.dispatchEvent(new KeyboardEvent('keydown', { key, bubbles: true }));
       const chosen = () => [...document.querySelectorAll('#tabs button')].findIndex((b) => b.ariaPressed === 'true');
       const shown = () => [...document.querySelectorAll('.panel')].filter((p) => p.offsetWidth > 0).length;
-      const notes = [];
       const canvas = () => [...document.querySelectorAll('.panel canvas')].map((c) => c.toDataURL()).join();
-      notes.push('panels ' + shown()); press('g'); notes.push('alone ' + shown());
-      press('2'); notes.push('chosen ' + chosen()); press('ArrowLeft'); notes.push('flipped ' + chosen()); press('g');
-      for (const key of ['+', 'm', 'e', 'd']) { const before = canvas(); press(key); notes.push(key + ' ' + (canvas() !== before)); }
-      notes.push('wide ' + (document.documentElement.scrollWidth > innerWidth));
+      const where = () => document.getElementById('where').textContent;
+      const panel = () => [...document.querySelectorAll('.panel')].find((p) => p.offsetWidth > 0);
+      const point = (type, dx, dy) => {
+        const box = panel().getBoundingClientRect(), init = { bubbles: true, cancelable: true, pointerId: 1, deltaY: -300 };
+        Object.assign(init, { clientX: box.left + box.width / 2 + dx, clientY: box.top + box.height / 2 + dy });
+        panel().dispatchEvent(type === 'wheel' ? new WheelEvent(type, init) : new PointerEvent(type, init));
+      };
+      const notes = [], note = (name, value) => notes.push(name + ' ' + value);
+      const changes = (name, act) => { const before = canvas(); act(); note(name, canvas() !== before); };
+      note('panels', shown()); press('o'); note('alone', shown());
+      press('2'); note('chosen', chosen()); press('ArrowLeft'); note('left', chosen()); press('x'); note('flipped', chosen());
+      press('b'); note('side by side', !document.getElementById('compared').hidden);
+      for (const key of [']', '[', '+', 'c', 'f', 'm', 'e']) changes(key, () => press(key));
+      press('g');
+      // The pixel under the mouse: the drag takes it along, the wheel keeps it, and moves all that is around.
+      point('pointermove', 7, 5); const first = where();
+      point('pointerdown', 7, 5); point('pointermove', 67, 5); note('dragged', where() === first); point('pointerup', 67, 5);
+      changes('wheel', () => point('wheel', 67, 5)); point('pointermove', 67, 5); note('kept', where() === first);
+      point('pointermove', 7, 5); note('moved', where() !== first);
+      press('w'); press('f');
+      for (let i = 0; i < 50; i++) { press('a'); press('w'); }
+      for (let i = 0; i < 6; i++) press('d');
+      for (let i = 0; i < 7; i++) press('s');
+      note('wide', document.documentElement.scrollWidth > innerWidth);
       document.title = notes.join('; ');
     }, 500));</script></body>"#;
     std::fs::write(options.output.join("keys.html"), viewer.replace("</body>", press)).expect("written");
-    let html = dump("keys.html#pixel=5,7", "1280,800");
-    let notes = "panels 3; alone 1; chosen 2; flipped 1; + true; m true; e true; d true; wide false";
-    assert!(html.contains(&format!("<title>{notes}</title>")), "{}", html.chars().take(300).collect::<String>());
-    // `d` went one pixel to the right.
+    let html = dump("keys.html", "1280,800");
+    let notes = "panels 3; alone 1; chosen 2; left 1; flipped 2; side by side true; ] true; [ true; + true; c true; f true; m true; \
+                 e true; dragged true; wheel true; kept true; moved true; wide false";
+    assert!(html.contains(&format!("<title>{notes}</title>")), "{}", html.chars().take(500).collect::<String>());
     let [x, y] = [6, 7];
     assert!(html.contains(&format!("Pixel {x}, {y}")), "{html}");
-    for values in [&found[0].truth.values, &found[0].methods[0].picture, &found[0].methods[1].picture] {
-        let at = 3 * (y * found[0].truth.size[0] as usize + x);
-        let shown: Vec<f32> = values[at..at + 3].to_vec();
-        let cells: Vec<Vec<f32>> = html
-            .split("<tr><th>")
-            .skip(1)
-            .map(|row| row.split("<td>").skip(1).take(3).filter_map(|c| c.split('<').next()?.parse().ok()).collect())
-            .collect();
-        assert!(cells.contains(&shown), "{shown:?} in {cells:?}");
+    let cells = |row: &str| -> Vec<f32> {
+        row.split("<td>").skip(1).filter_map(|c| c.split('<').next()?.replace('−', "-").parse().ok()).collect()
+    };
+    let rows: Vec<Vec<f32>> = html.split("<tbody>").nth(1).expect("values").split("<tr>").skip(1).map(cells).collect();
+    let (reference, methods) = (&found[0].truth.values, &found[0].methods);
+    let pixel = y * found[0].truth.size[0] as usize + x;
+    let at = |values: &[f32]| values[3 * pixel..3 * pixel + 3].to_vec();
+    assert_eq!(rows[0], at(reference));
+    for (row, method) in rows[1..].iter().zip(methods) {
+        assert_eq!(row[..3], at(&method.picture));
+        // Difference, relMSE and FLIP, with three digits.
+        let pairs = at(&method.picture).into_iter().zip(at(reference));
+        let [difference, square] =
+            pairs.fold([0.0, 0.0], |[d, e], (x, r)| [d + (x - r) / 3.0, e + (x - r).powi(2) / (r * r + 0.01) / 3.0]);
+        for (shown, true_value) in row[3..].iter().zip([difference, square, method.flip_map[pixel]]) {
+            assert!((shown - true_value).abs() <= 0.006 * true_value.abs(), "{row:?}: {true_value}");
+        }
+        assert_eq!(row.len(), 6, "{row:?}");
     }
     let index = std::fs::read_to_string(options.output.join("index.html")).expect("a page");
     // Pages in frames of a phone's width to that of a large screen tell whether they are wider than that.
     let measure = "<script>parent.postMessage('wide ' + (document.documentElement.scrollWidth > innerWidth), '*')</script></body>";
-    for (name, page) in [("index", &index), ("viewer", &viewer)] {
+    let scene = std::fs::read_to_string(options.output.join("scene-2.html")).expect("a page");
+    assert!(scene.contains("viewer.html#scene=1&amp;place=2") && index.contains("href=\"scene-2.html\""));
+    for (name, page) in [("index", &index), ("scene", &scene), ("viewer", &viewer)] {
         std::fs::write(options.output.join("width.html"), page.replace("</body>", measure)).expect("written");
-        for width in [360, 800, 1280, 2560] {
+        for width in [360, 768, 1280, 2560] {
             let frame = format!(
                 "<!doctype html><title>waits</title><script>onmessage = (e) => {{ document.title = e.data; }}</script>\
                  <iframe src=\"width.html\" style=\"width: {width}px; height: 800px\"></iframe>"

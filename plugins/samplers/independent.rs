@@ -44,6 +44,10 @@ impl Sampler for Independent {
         self.0.seed
     }
 
+    fn is_sequence(&self) -> bool {
+        true
+    }
+
     fn point_set(&self, _seed: u32, _spp: u32, _film_size: UVec2) -> Option<Box<dyn PointSet>> {
         None
     }

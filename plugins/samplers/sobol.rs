@@ -47,6 +47,10 @@ impl Sampler for Sobol {
         self.0.seed
     }
 
+    fn is_sequence(&self) -> bool {
+        true
+    }
+
     fn point_set(&self, seed: u32, _spp: u32, _film_size: UVec2) -> Option<Box<dyn PointSet>> {
         Some(Box::new(Points { seed }))
     }

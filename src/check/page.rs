@@ -248,11 +248,11 @@ footer { border-top: 1px solid var(--line); margin-top: 2rem; font-size: .92rem;
 .small { font-size: .86rem; opacity: .75; overflow-wrap: anywhere; }
 .good, .bad, .so { font-weight: 600; } .good { color: var(--good); } .bad { color: var(--bad); } .so { color: var(--so); }
 h2 span { border: 1px solid currentColor; border-radius: 1em; padding: 0 .6em; font-size: .85rem; margin-left: .4em; }
-table { border-collapse: collapse; margin: .6rem 0; } th { font-weight: 600; }
+table { border-collapse: collapse; margin: .6rem 0; display: block; max-width: 100%; overflow-x: auto; } th { font-weight: 600; }
 td, th { padding: .15rem .9rem .15rem 0; text-align: left; border-bottom: 1px solid var(--line);
   font-variant-numeric: tabular-nums; }
 .maps { display: flex; flex-wrap: wrap; gap: 1rem; margin: 1rem 0; } figure { margin: 0; max-width: 100%; }
-.frame { position: relative; display: inline-block; line-height: 0; border: 1px solid var(--soft); }
+.frame { position: relative; display: inline-block; max-width: 100%; line-height: 0; border: 1px solid var(--soft); }
 .frame img { image-rendering: pixelated; max-width: 100%; height: auto; }
 .frame svg { position: absolute; inset: 0; width: 100%; height: 100%; pointer-events: none; }
 .frame rect { fill: none; stroke: #ff9500; stroke-width: .7; }

@@ -119,6 +119,26 @@ struct Answer {
     times: Vec<f64>,
     variant: String,
     notes: Vec<String>,
+    /// What it told at the end of a job that is timed.
+    end: Value,
+}
+
+/// Pictures that were timed.
+pub(crate) struct Timed {
+    /// In the order they were asked for.
+    pub pictures: Vec<TimedPicture>,
+    /// The most memory the process had, in MiB, if the system tells.
+    pub peak_mib: Option<f64>,
+}
+
+/// A picture that was timed.
+pub(crate) struct TimedPicture {
+    /// The picture.
+    pub image: Image,
+    /// Wall-clock seconds of rendering.
+    pub seconds: f64,
+    /// Seconds of processor time, of all threads.
+    pub cpu: Option<f64>,
 }
 
 /// Renders one picture per seed.
@@ -154,7 +174,12 @@ fn render(python: &Python, job: &Value, seeds: usize, size: [u32; 2]) -> Result<
         images.push(Image { width, height, channels: channels.clone(), data });
     }
     let variant = head["variant"].as_str().unwrap_or_default().to_owned();
-    Ok(Answer { images, times, variant, notes: strings("notes") })
+    let mut line = String::new();
+    if job["spp"].is_array() {
+        let _ = output.take(1 << 20).read_line(&mut line);
+    }
+    let end = serde_json::from_str(&line).unwrap_or_default();
+    Ok(Answer { images, times, variant, notes: strings("notes"), end })
 }
 
 /// The version of the package.
@@ -166,7 +191,7 @@ pub(crate) fn version(scene: &Path) -> Result<String, String> {
 }
 
 /// Renders a scene that is given as text for the reference: one picture for each number of samples per pixel, all with one
-/// seed, and the seconds of each.
+/// seed, and the time of each.
 ///
 /// # Errors
 /// If there is no package, or it cannot render the scene.
@@ -177,7 +202,7 @@ pub(crate) fn render_text(
     counts: &[u32],
     seed: u32,
     size: [u32; 2],
-) -> Result<Vec<(Image, f64)>, String> {
+) -> Result<Timed, String> {
     let python = python(scene).map_err(|refusal| refusal.text())?;
     let file = TemporaryFile::new(text).map_err(|refusal| refusal.text())?;
     let job = json!({
@@ -190,7 +215,10 @@ pub(crate) fn render_text(
         "threads": rayon::current_num_threads(),
     });
     let answer = render(python, &job, counts.len(), size)?;
-    Ok(answer.images.into_iter().zip(answer.times).collect())
+    let cpu = |i: usize| answer.end["cpu"][i].as_f64();
+    let pictures = answer.images.into_iter().zip(&answer.times).enumerate();
+    let pictures = pictures.map(|(i, (image, seconds))| TimedPicture { image, seconds: *seconds, cpu: cpu(i) });
+    Ok(Timed { pictures: pictures.collect(), peak_mib: answer.end["peak_mib"].as_f64() })
 }
 
 /// A way to hand the scene to the reference.

@@ -3,8 +3,10 @@
 use super::Failure;
 use super::scene_args::ReadingArguments;
 use crate::check::cache;
+use crate::compare::facts::Facts;
 use crate::compare::method::Methods;
 use crate::compare::results::SceneResult;
+use crate::compare::turn::{self, Place};
 use crate::compare::{Budgets, Options, compare, page};
 use clap::Args;
 use lucerna_core::scene::Registry;
@@ -81,6 +83,10 @@ pub struct Arguments {
     #[arg(long)]
     no_curves: bool,
 
+    /// The relMSE to tell the time to; by default that of the baseline's longest run
+    #[arg(long, value_name = "RELMSE", value_parser = error)]
+    target: Option<f64>,
+
     /// Another picture size, as WIDTHxHEIGHT
     #[arg(long, value_name = "WxH", value_parser = super::render::size)]
     size: Option<[u32; 2]>,
@@ -103,6 +109,10 @@ pub struct Arguments {
     /// Do not tell of every run
     #[arg(short, long)]
     quiet: bool,
+
+    /// Take one turn and answer on standard output: how a comparison starts its processes
+    #[arg(long, hide = true)]
+    turn: Option<String>,
 }
 
 fn seconds(text: &str) -> Result<f64, String> {
@@ -112,8 +122,15 @@ fn seconds(text: &str) -> Result<f64, String> {
     }
 }
 
+fn error(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(error) if error > 0.0 && error.is_finite() => Ok(error),
+        _ => Err("expected an error above 0".to_owned()),
+    }
+}
+
 impl Arguments {
-    fn options(&self) -> Options {
+    fn options(&self, place: Place) -> Options {
         let (mut seconds, mut spp) = (self.seconds.clone(), self.spp.clone());
         if seconds.is_empty() && spp.is_empty() {
             seconds.push(5.0);
@@ -129,6 +146,8 @@ impl Arguments {
             seeds: self.seeds,
             seed: self.seed,
             no_curves: self.no_curves,
+            target: self.target,
+            place,
             reference: self.reference.clone(),
             reference_method: self.reference_method.clone(),
             reference_seconds: self.reference_seconds,
@@ -141,8 +160,14 @@ impl Arguments {
 /// Compares.
 pub fn run(registry: &Registry, arguments: &Arguments) -> Result<ExitCode, Failure> {
     super::set_threads(arguments.threads)?;
-    let options = arguments.options();
     let mut methods = Methods::parse(&arguments.methods).map_err(Failure::new)?;
+    if let Some(turn) = &arguments.turn {
+        turn::serve(registry, &methods, &arguments.options(Place::Here), turn);
+        return Ok(ExitCode::SUCCESS);
+    }
+    let program =
+        std::env::current_exe().map_err(|e| Failure::new(format!("this program cannot be started again: {e}")))?;
+    let options = arguments.options(Place::Process { program, arguments: std::env::args_os().skip(1).collect() });
     if let Some(name) = &arguments.baseline {
         if !methods.list.iter().any(|m| m.name == *name) {
             return Err(Failure::new(format!("--baseline {name}: no method is called so")));
@@ -155,7 +180,7 @@ pub fn run(registry: &Registry, arguments: &Arguments) -> Result<ExitCode, Failu
     if let Some(missing) = arguments.scenes.iter().find(|scene| !scene.is_file()) {
         return Err(Failure::new(format!("{}: no such file", missing.display())));
     }
-    let command = command();
+    let facts = Facts::gather(command(), &methods, &arguments.scenes[0]);
     let (mut done, mut failed) = (Vec::new(), Vec::new());
     for scene in &arguments.scenes {
         let mut tell = |line: String| {
@@ -174,7 +199,7 @@ pub fn run(registry: &Registry, arguments: &Arguments) -> Result<ExitCode, Failu
             }
         }
         if !done.is_empty() {
-            page::write(&done, &failed, &options, &command).map_err(Failure::new)?;
+            page::write(&done, &failed, &options, &facts).map_err(Failure::new)?;
         }
     }
     if !done.is_empty() {

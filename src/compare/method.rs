@@ -2,7 +2,7 @@
 
 use crate::short_form::{decide, parse, plain_value};
 use lucerna_core::scene::{Description, Location, Node, ObjectKind, Parameter, Registry, Value};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -33,25 +33,30 @@ pub struct Methods {
 }
 
 /// A file of methods.
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
+    #[serde(skip_serializing_if = "Option::is_none")]
     baseline: Option<String>,
     method: Vec<Entry>,
 }
 
 /// One `[[method]]` of a file.
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Entry {
     name: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
     renderer: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     integrator: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     sampler: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     light_sampler: Option<String>,
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     parameters: BTreeMap<String, toml::Value>,
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     define: BTreeMap<String, String>,
 }
 
@@ -85,6 +90,43 @@ impl Methods {
             None => Ok(Methods { list, baseline }),
         }
     }
+}
+
+impl Methods {
+    /// As a file that [`Methods::parse`] reads.
+    pub fn to_toml(&self) -> String {
+        let file = File { baseline: self.baseline.clone(), method: self.list.iter().map(Entry::of).collect() };
+        // All of it can be written as TOML: there are tables, texts and numbers only.
+        toml::to_string(&file).unwrap_or_default()
+    }
+}
+
+impl Entry {
+    fn of(method: &Method) -> Self {
+        let value = |value: &Value| match value {
+            Value::Integer(v) => toml::Value::Integer(*v),
+            Value::Float(v) => toml::Value::Float(*v),
+            Value::Boolean(v) => toml::Value::Boolean(*v),
+            other => toml::Value::String(plain_text(other)),
+        };
+        let parameters = method.integrator.iter().flat_map(|node| &node.parameters);
+        Entry {
+            name: method.name.clone(),
+            renderer: method.variant.as_ref().map(|variant| format!("mitsuba:{variant}")),
+            integrator: method.integrator.as_ref().map(|node| node.plugin.clone()),
+            sampler: method.sampler.as_ref().map(short),
+            light_sampler: method.light_sampler.as_ref().map(short),
+            parameters: parameters.map(|p| (p.name.clone(), value(&p.value))).collect(),
+            define: method.defines.iter().cloned().collect(),
+        }
+    }
+}
+
+/// A plugin in short form.
+fn short(node: &Node) -> String {
+    let values = node.parameters.iter().map(|p| format!("{}={}", p.name, plain_text(&p.value)));
+    let values = values.collect::<Vec<_>>().join(",");
+    if values.is_empty() { node.plugin.clone() } else { format!("{}:{values}", node.plugin) }
 }
 
 /// Line and message of a mistake in a file.
@@ -157,11 +199,6 @@ impl Method {
 
     /// What it is, in one line.
     pub fn describe(&self) -> String {
-        let short = |node: &Node| {
-            let values = node.parameters.iter().map(|p| format!("{}={}", p.name, plain_text(&p.value)));
-            let values = values.collect::<Vec<_>>().join(",");
-            if values.is_empty() { node.plugin.clone() } else { format!("{}:{values}", node.plugin) }
-        };
         let mut parts = vec![self.variant.as_ref().map_or("Lucerna".to_owned(), |v| format!("mitsuba {v}"))];
         parts.push(self.integrator.as_ref().map_or("the scene's integrator".to_owned(), short));
         parts.extend(self.sampler.as_ref().map(|s| format!("sampler {}", short(s))));
@@ -247,6 +284,30 @@ mod tests {
             let message = Method::of_text(wrong).unwrap_err();
             assert!(message.starts_with("--methods") && !message.contains('\n'), "{message}");
         }
+    }
+
+    #[test]
+    fn what_is_written_is_read_again() {
+        let texts =
+            ["scene", "path:max_depth=4,hide_emitters=true,sampler=sobol", "mitsuba:llvm_ad_rgb:path:rr_depth=3"];
+        let mut methods = Methods::parse(&texts.map(str::to_owned)).unwrap();
+        methods.list[0].defines.push(("power".to_owned(), "1.5".to_owned()));
+        methods.list[1].sampler = Some(parse(ObjectKind::Sampler, "sobol:sample_count=16", "").unwrap());
+        methods.baseline = Some(texts[1].to_owned());
+        let file = std::env::temp_dir().join(format!("lucerna-methods-{}.toml", std::process::id()));
+        std::fs::write(&file, methods.to_toml()).unwrap();
+        let again = Methods::parse(&[file.display().to_string()]).unwrap();
+        std::fs::remove_file(file).unwrap();
+        let told = |methods: &Methods| methods.list.iter().map(|m| (m.name.clone(), m.describe())).collect::<Vec<_>>();
+        let sorted = |text: &str| {
+            let mut parts: Vec<String> = text.split([',', ':']).map(|part| part.trim().to_owned()).collect();
+            parts.sort();
+            parts
+        };
+        for ((a, b), (c, d)) in told(&methods).iter().zip(&told(&again)) {
+            assert_eq!((a, sorted(b)), (c, sorted(d)));
+        }
+        assert_eq!(again.baseline, methods.baseline);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Plots with two logarithmic axes, as SVG that takes its colours from the page.
 
+use crate::check::page::escape;
 use std::fmt::Write as _;
 
 /// A point and its interval.
@@ -208,6 +209,85 @@ impl Plot<'_> {
     }
 }
 
+/// A value of one method on a common axis.
+pub struct Bar {
+    /// Chooses colour and marker.
+    pub number: usize,
+    /// Its name.
+    pub name: String,
+    /// The value.
+    pub value: f64,
+    /// Its interval.
+    pub bounds: Option<[f64; 2]>,
+    /// What is told when the mouse rests on it.
+    pub title: String,
+}
+
+/// Ratios below each other on one logarithmic axis, with a line at 1.
+pub struct Forest {
+    /// Name of the axis.
+    pub label: String,
+    /// From top to bottom.
+    pub bars: Vec<Bar>,
+}
+
+impl Forest {
+    /// The picture; nothing if there is no bar.
+    pub fn svg(&self) -> String {
+        const WIDTH: f64 = 560.0;
+        const ROW: f64 = 26.0;
+        // Names stand above their bars on the left, so that the axis has all of the width.
+        let (x0, x1, y1) = (10.0, WIDTH - 10.0, 6.0);
+        let y0 = y1 + 2.0 * ROW * self.bars.len() as f64 * 0.8;
+        let step = (y0 - y1) / self.bars.len().max(1) as f64;
+        let values = self.bars.iter().flat_map(|b| [Some(b.value), b.bounds.map(|b| b[0]), b.bounds.map(|b| b[1])]);
+        let Some(axis) = Axis::new(values.flatten().chain([1.0]), x0, x1) else { return String::new() };
+        let label = escape(&self.label);
+        let mut svg = format!(
+            "<svg class=\"plot forest\" viewBox=\"0 0 {WIDTH} {:.0}\" role=\"img\" aria-label=\"{label}\">\n",
+            y0 + 40.0
+        );
+        for tick in axis.ticks() {
+            let at = axis.at(tick);
+            let _ = writeln!(
+                svg,
+                "<line class=\"grid\" x1=\"{at:.1}\" y1=\"{y0:.1}\" x2=\"{at:.1}\" y2=\"{y1}\"/><text x=\"{at:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{} ×</text>",
+                y0 + 16.0,
+                tick_text(tick)
+            );
+        }
+        let one = axis.at(1.0);
+        let _ = writeln!(svg, "<line class=\"one\" x1=\"{one:.1}\" y1=\"{y0:.1}\" x2=\"{one:.1}\" y2=\"{y1}\"/>");
+        for (row, bar) in self.bars.iter().enumerate() {
+            let top = y1 + step * row as f64;
+            let (middle, at) = (top + 0.7 * step, axis.at(bar.value));
+            let _ = write!(svg, "<g class=\"c{}\"><title>{}</title>", bar.number % 8, escape(&bar.title));
+            let _ = write!(
+                svg,
+                "<text class=\"name\" x=\"{x0}\" y=\"{:.1}\">{}</text>",
+                top + 0.42 * step,
+                escape(&bar.name)
+            );
+            if let Some([low, high]) = bar.bounds {
+                let _ = write!(
+                    svg,
+                    "<line class=\"bar\" x1=\"{:.1}\" y1=\"{middle:.1}\" x2=\"{:.1}\" y2=\"{middle:.1}\"/>",
+                    axis.at(low),
+                    axis.at(high)
+                );
+            }
+            let _ = writeln!(svg, "{}</g>", marker(bar.number, at, middle));
+        }
+        let _ = writeln!(
+            svg,
+            "<text class=\"axis\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{label}</text>\n</svg>",
+            0.5 * WIDTH,
+            y0 + 35.0
+        );
+        svg
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -225,5 +305,7 @@ mod tests {
     fn nothing_to_plot() {
         let plot = Plot { label: "", x: "", y: "", curves: Vec::new(), floor: None };
         assert_eq!(plot.svg(), "");
+        let svg = Forest { label: String::new(), bars: Vec::new() }.svg();
+        assert!(!svg.contains("<title>"), "{svg}");
     }
 }

@@ -1,15 +1,11 @@
-//! What a comparison found, as numbers: for the page, and as JSON and CSV.
+//! What a comparison found, as numbers: for the page and the tables.
 
 use super::method::Method;
 use super::truth::Truth;
-use super::{Options, machine};
 use lucerna_core::stats::chi2::sidak;
-use lucerna_core::stats::metrics::{
-    EPSILON, Errors, FIREFLY, Interval, TRIMMED, efficiency, log_slope, standard_error,
-};
+use lucerna_core::stats::metrics::{Errors, Interval, efficiency, log_slope, standard_error};
+use lucerna_core::stats::ranks::typical_ratio;
 use lucerna_core::stats::student::two_sided_p;
-use serde_json::{Value, json};
-use std::fmt::Write as _;
 use std::path::PathBuf;
 
 /// One number of samples per pixel of a method: one entry a seed.
@@ -17,14 +13,22 @@ use std::path::PathBuf;
 pub struct Point {
     /// Samples per pixel.
     pub spp: u32,
+    /// Those of the run on whose way it was seen; the same number if it was rendered for itself.
+    pub of: u32,
     /// Seconds of rendering.
     pub seconds: Vec<f64>,
+    /// Seconds of processor time; empty if not known.
+    pub cpu: Vec<f64>,
+    /// The most memory in MiB; empty if not known.
+    pub memory: Vec<f64>,
     /// Errors.
     pub errors: Vec<Errors>,
+    /// LDR- and HDR-FLIP; empty if no budget asks for the point.
+    pub flip: Vec<[f64; 2]>,
     /// Mean variance of a picture.
     pub variance: Option<f64>,
     /// Mean squared bias.
-    pub bias_squared: Option<f64>,
+    pub bias_squared: Option<Interval>,
 }
 
 impl Point {
@@ -48,9 +52,31 @@ impl Point {
         self.errors.iter().zip(&self.seconds).map(|(e, seconds)| efficiency(measure(e), *seconds)).collect()
     }
 
-    /// Seconds for one sample per pixel, seed by seed.
-    pub fn per_sample(&self) -> Vec<f64> {
-        self.seconds.iter().map(|seconds| seconds / f64::from(self.spp)).collect()
+    /// Seconds for one sample per pixel, seed by seed: of the processors where both are known, else of the clock.
+    fn per_sample(&self, of_processors: bool) -> Vec<f64> {
+        let seconds = if of_processors { &self.cpu } else { &self.seconds };
+        seconds.iter().map(|seconds| seconds / f64::from(self.spp)).collect()
+    }
+
+    /// Whether the processor time of every run is known.
+    pub fn knows_processors(&self) -> bool {
+        self.cpu.len() == self.seconds.len()
+    }
+
+    /// LDR-FLIP (0) or HDR-FLIP (1).
+    pub fn flip(&self, kind: usize) -> Option<Interval> {
+        let values: Vec<f64> = self.flip.iter().map(|both| both[kind]).collect();
+        (!values.is_empty()).then(|| Interval::of_mean(&values))
+    }
+
+    /// The most memory in MiB.
+    pub fn memory(&self) -> Option<Interval> {
+        (!self.memory.is_empty()).then(|| Interval::of_mean(&self.memory))
+    }
+
+    /// Seconds of processor time.
+    pub fn processor_time(&self) -> Option<Interval> {
+        (!self.cpu.is_empty()).then(|| Interval::of_mean(&self.cpu))
     }
 
     /// How much brighter than the reference the picture is as a whole, the reference's own noise included.
@@ -79,9 +105,73 @@ pub struct MethodResult {
     pub stops: Vec<usize>,
     /// The picture of the first seed and the last point.
     pub picture: Vec<f32>,
+    /// Its HDR-FLIP, pixel by pixel.
+    pub flip_map: Vec<f32>,
+    /// Whether the points of its curve were seen on the way of one run.
+    pub is_sequence: bool,
+}
+
+/// When a method reaches an error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reached {
+    /// After so many seconds.
+    After(Interval),
+    /// Not within the longest run.
+    NotWithin(f64),
 }
 
 impl MethodResult {
+    /// Of a method that has no runs yet.
+    pub fn new(method: Method) -> Self {
+        MethodResult {
+            method,
+            failed: None,
+            points: Vec::new(),
+            stops: Vec::new(),
+            picture: Vec::new(),
+            flip_map: Vec::new(),
+            is_sequence: false,
+        }
+    }
+
+    /// Seconds until the relMSE falls to `target`, on the straight lines between the points of the mean curve in
+    /// logarithms; the interval is the jackknife's, over the seeds. `None` if there are fewer than two points.
+    pub fn time_to(&self, target: f64) -> Option<Reached> {
+        let last = self.last().filter(|_| self.points.len() >= 2)?;
+        // The rounding of a mean is not an error that is missed.
+        if last.mean(|e| e.rel_mse).value > target * (1.0 + 1e-9) {
+            return Some(Reached::NotWithin(last.time().value));
+        }
+        let seeds = last.errors.len();
+        let whole = self.log_time_to(target, None)?;
+        let without = (0..seeds).map(|seed| self.log_time_to(target, Some(seed))).collect::<Option<Vec<_>>>();
+        let found = match without.filter(|_| seeds >= 3) {
+            Some(without) => Interval::of_jackknife(whole, &without),
+            None => Interval { value: whole, bounds: None },
+        };
+        Some(Reached::After(Interval { value: found.value.exp(), bounds: found.bounds.map(|b| b.map(f64::exp)) }))
+    }
+
+    /// Logarithm of the seconds, from all seeds but one; the last line goes on beyond the last point.
+    fn log_time_to(&self, target: f64, without: Option<usize>) -> Option<f64> {
+        let mean = |values: &mut dyn Iterator<Item = f64>| {
+            let kept = values.enumerate().filter(|(seed, _)| Some(*seed) != without);
+            let (sum, count) = kept.fold((0.0, 0.0), |(sum, count), (_, v)| (sum + v, count + 1.0));
+            f64::ln(sum / count)
+        };
+        let logs: Vec<(f64, f64)> = (self.points.iter())
+            .map(|p| (mean(&mut p.seconds.iter().copied()), mean(&mut p.errors.iter().map(|e| e.rel_mse))))
+            .filter(|(t, e)| t.is_finite() && e.is_finite())
+            .collect();
+        let wanted = target.ln();
+        if logs.first()?.1 <= wanted {
+            return Some(logs[0].0);
+        }
+        let at = (1..logs.len()).find(|&i| logs[i].1 <= wanted).unwrap_or(logs.len() - 1);
+        let [(t0, e0), (t1, e1)] = [*logs.get(at.checked_sub(1)?)?, logs[at]];
+        (e1 < e0).then(|| t0 + (t1 - t0) * (wanted - e0) / (e1 - e0))
+    }
+
     /// The point of the longest budget.
     pub fn last(&self) -> Option<&Point> {
         self.points.last().filter(|_| self.failed.is_none())
@@ -128,10 +218,22 @@ impl SceneResult {
         Interval::of_ratio(&ours.efficiencies(measure), &base.efficiencies(measure))
     }
 
-    /// Time of a sample over the baseline's: above 1 is slower.
+    /// Time of a sample over the baseline's, by the clock: above 1 is slower.
     pub fn slowdown(&self, method: usize, budget: usize) -> Option<Interval> {
         let (ours, base) = self.pair(method, budget)?;
-        Interval::of_ratio(&ours.per_sample(), &base.per_sample())
+        typical_ratio(&ours.per_sample(false), &base.per_sample(false))
+    }
+
+    /// The same of processor time, which other programs on the machine add little to.
+    pub fn processor_slowdown(&self, method: usize, budget: usize) -> Option<Interval> {
+        let (ours, base) = self.pair(method, budget)?;
+        let known = ours.knows_processors() && base.knows_processors();
+        known.then(|| typical_ratio(&ours.per_sample(true), &base.per_sample(true))).flatten()
+    }
+
+    /// The relMSE whose time is told: the one that was asked for, or that of the baseline's longest run.
+    pub fn target(&self, asked: Option<f64>) -> Option<f64> {
+        asked.or_else(|| Some(self.methods[self.baseline].last()?.mean(|e| e.rel_mse).value))
     }
 
     /// Whether the mean of a method's pictures is off by more than noise. The level of 5 % is shared among the methods
@@ -147,117 +249,64 @@ impl SceneResult {
     }
 }
 
-fn interval(found: Interval) -> Value {
-    json!({ "value": found.value, "low": found.bounds.map(|b| b[0]), "high": found.bounds.map(|b| b[1]) })
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// The document of a comparison. `command` repeats it.
-pub fn to_json(scenes: &[SceneResult], failed: &[(PathBuf, String)], options: &Options, command: &str) -> Value {
-    json!({
-        "version": env!("CARGO_PKG_VERSION"),
-        "command": command,
-        "machine": { "processor": machine(), "threads": rayon::current_num_threads(), "system": std::env::consts::OS },
-        "seeds": options.seeds,
-        "first_seed": options.seed,
-        "budgets": options.budgets.names(),
-        "confidence": 1.0 - Interval::MISS,
-        "definitions": { "epsilon": EPSILON, "trimmed": TRIMMED, "firefly": FIREFLY },
-        "scenes": scenes.iter().map(|scene| scene_json(scene, options)).collect::<Vec<_>>(),
-        "failed_scenes": failed.iter().map(|(scene, why)| json!({ "scene": scene.display().to_string(), "failed": why })).collect::<Vec<_>>(),
-    })
-}
-
-fn scene_json(scene: &SceneResult, options: &Options) -> Value {
-    let truth = &scene.truth;
-    let methods = scene.methods.iter().enumerate().map(|(i, method)| {
-        let mut value = json!({ "name": method.method.name, "what": method.method.describe() });
-        if let Some(why) = &method.failed {
-            value["failed"] = json!(why);
-            return value;
+    /// A method whose relMSE is `scale / seconds` in every run, up to 8 seconds; runs differ in speed by a percent.
+    fn falling(scale: f64) -> MethodResult {
+        let mut result = MethodResult::new(Method::of_text("path").unwrap());
+        for spp in [1, 2, 4, 8] {
+            let seconds: Vec<f64> = [0.99, 1.0, 1.01].map(|speed| speed * f64::from(spp)).to_vec();
+            let of = |seconds: &f64| {
+                let rel_mse = scale / seconds;
+                let (mse, rest) = (rel_mse, [0.0; 4]);
+                let [rel_mse_trimmed, mape, smape, mean_difference] = rest;
+                Errors { mse, rel_mse, rel_mse_trimmed, mape, smape, mean_difference, fireflies: 0, left_out: 0 }
+            };
+            let errors = seconds.iter().map(of).collect();
+            result.points.push(Point { spp, of: 8, seconds, errors, ..Point::default() });
         }
-        let [by_spp, by_seconds] = method.slopes();
-        value["slopes"] = json!({ "samples": by_spp.map(interval), "seconds": by_seconds.map(interval) });
-        value["points"] = method.points.iter().map(|point| point_json(point, scene)).collect();
-        let budgets = options.budgets.names().into_iter().enumerate().map(|(budget, name)| {
-            json!({
-                "budget": name,
-                "spp": scene.pair(i, budget).map(|(ours, _)| ours.spp),
-                "against_baseline": {
-                    "efficiency_mse": scene.gain(i, budget, |e| e.mse).map(interval),
-                    "efficiency_rel_mse": scene.gain(i, budget, |e| e.rel_mse).map(interval),
-                    "efficiency_rel_mse_trimmed": scene.gain(i, budget, |e| e.rel_mse_trimmed).map(interval),
-                    "seconds_per_sample": scene.slowdown(i, budget).map(interval),
-                },
-            })
-        });
-        value["budgets"] = budgets.collect();
-        value
-    });
-    json!({
-        "scene": scene.scene.display().to_string(),
-        "size": truth.size,
-        "reference": {
-            "source": truth.source,
-            "spp": truth.spp,
-            "noise_mse": truth.noise.map(|n| n[0]),
-            "noise_rel_mse": truth.noise.map(|n| n[1]),
-            "is_good_enough": truth.reached,
-        },
-        "baseline": scene.methods[scene.baseline].method.name,
-        "methods": methods.collect::<Vec<_>>(),
-    })
-}
-
-fn point_json(point: &Point, scene: &SceneResult) -> Value {
-    json!({
-        "spp": point.spp,
-        "seconds": interval(point.time()),
-        "mse": interval(point.mean(|e| e.mse)),
-        "rel_mse": interval(point.mean(|e| e.rel_mse)),
-        "rel_mse_trimmed": interval(point.mean(|e| e.rel_mse_trimmed)),
-        "mape": interval(point.mean(|e| e.mape)),
-        "smape": interval(point.mean(|e| e.smape)),
-        "fireflies": interval(point.mean(|e| e.fireflies as f64)),
-        "left_out": point.errors.iter().map(|e| e.left_out).sum::<usize>(),
-        "efficiency_mse": interval(Interval::of_mean(&point.efficiencies(|e| e.mse))),
-        "efficiency_rel_mse": interval(Interval::of_mean(&point.efficiencies(|e| e.rel_mse))),
-        "variance": point.variance,
-        "bias_squared": point.bias_squared,
-        "mean_difference": interval(point.mean_difference(&scene.truth)),
-        "is_biased": scene.is_biased(point),
-    })
-}
-
-/// One line a run: comma-separated, with a head.
-pub fn to_csv(scenes: &[SceneResult], options: &Options) -> String {
-    let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
-    let mut text = "scene,method,spp,seed,seconds,mse,rel_mse,rel_mse_trimmed,mape,smape,mean_difference,fireflies,left_out,failed\n".to_owned();
-    for scene in scenes {
-        let name = quoted(&scene.scene.display().to_string());
-        for method in &scene.methods {
-            let label = quoted(&method.method.name);
-            if let Some(why) = &method.failed {
-                let _ = writeln!(text, "{name},{label},,,,,,,,,,,,{}", quoted(why));
-            }
-            for point in &method.points {
-                for (run, (e, seconds)) in point.errors.iter().zip(&point.seconds).enumerate() {
-                    let seed = options.seed.wrapping_add(run as u32);
-                    let _ = writeln!(
-                        text,
-                        "{name},{label},{},{seed},{seconds},{},{},{},{},{},{},{},{},",
-                        point.spp,
-                        e.mse,
-                        e.rel_mse,
-                        e.rel_mse_trimmed,
-                        e.mape,
-                        e.smape,
-                        e.mean_difference,
-                        e.fireflies,
-                        e.left_out
-                    );
-                }
-            }
-        }
+        result.stops = vec![3];
+        result
     }
-    text
+
+    #[test]
+    fn the_time_to_an_error() {
+        let method = falling(0.6);
+        let Some(Reached::After(found)) = method.time_to(0.2) else { panic!("it is reached after 3 seconds") };
+        assert!((found.value - 3.0).abs() < 0.01 && !found.excludes(3.0), "{found:?}");
+        let [low, high] = found.bounds.unwrap();
+        assert!(high - low < 0.2, "{found:?}");
+        // What the last point has is reached there; less is not; more than the first has is there from the start.
+        let last = method.last().unwrap().mean(|e| e.rel_mse).value;
+        assert!(matches!(method.time_to(last), Some(Reached::After(t)) if (t.value - 8.0).abs() < 0.01));
+        assert_eq!(method.time_to(0.99 * last), Some(Reached::NotWithin(8.0)));
+        assert!(matches!(method.time_to(5.0), Some(Reached::After(t)) if (t.value - 1.0).abs() < 1e-9));
+        assert_eq!(MethodResult { points: method.points[..1].to_vec(), ..method }.time_to(0.1), None);
+    }
+
+    #[test]
+    fn ratios_know_who_is_better() {
+        let truth = Truth {
+            values: Vec::new(),
+            size: [0, 0],
+            channels: Vec::new(),
+            noise: None,
+            source: String::new(),
+            spp: 0,
+            reached: None,
+        };
+        let mut slower = falling(0.3);
+        slower.points.iter_mut().for_each(|p| p.cpu = p.seconds.iter().map(|s| 1.5 * s).collect());
+        let mut base = falling(0.6);
+        base.points.iter_mut().for_each(|p| p.cpu = p.seconds.clone());
+        let scene = SceneResult { scene: PathBuf::new(), truth, methods: vec![base, slower], baseline: 0 };
+        let gain = scene.gain(1, 0, |e| e.rel_mse).unwrap();
+        assert!((gain.value - 2.0).abs() < 1e-9, "half of the error in the same time: {gain:?}");
+        assert!((scene.processor_slowdown(1, 0).unwrap().value - 1.5).abs() < 1e-9);
+        assert!((scene.slowdown(1, 0).unwrap().value - 1.0).abs() < 1e-9);
+        assert_eq!(scene.target(Some(0.5)), Some(0.5));
+        assert!((scene.target(None).unwrap() - 0.075).abs() < 1e-4);
+    }
 }

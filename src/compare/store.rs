@@ -35,7 +35,9 @@ impl Store {
         let path = self.path(subject, &format!("{spp} {seed}"));
         let about: Value = serde_json::from_slice(&std::fs::read(path.with_extension("json")).ok()?).ok()?;
         let image = exr::read(&path.with_extension("exr"), &ReadLimits::default()).ok()?.image;
-        Some(Shot { spp, seconds: about["seconds"].as_f64()?, image })
+        let number = |name: &str| about[name].as_f64();
+        let of = about["of"].as_u64().and_then(|v| u32::try_from(v).ok()).unwrap_or(spp);
+        Some(Shot { spp, of, seconds: number("seconds")?, cpu: number("cpu"), memory: number("peak_mib"), image })
     }
 
     /// Keeps a run. It appears as a whole or not at all.
@@ -47,7 +49,10 @@ impl Store {
         let picture = path.with_extension("exr");
         write_exr(&picture, &shot.image)?;
         let bytes = std::fs::metadata(&picture).map_err(|e| format!("{}: {e}", picture.display()))?.len();
-        let about = json!({ "spp": shot.spp, "seed": seed, "seconds": shot.seconds, "bytes": bytes });
+        let about = json!({
+            "spp": shot.spp, "of": shot.of, "seed": seed, "seconds": shot.seconds, "cpu": shot.cpu, "peak_mib": shot.memory,
+            "bytes": bytes,
+        });
         write_json(&path.with_extension("json"), &about)
     }
 
@@ -66,7 +71,7 @@ impl Store {
     }
 
     fn path(&self, subject: &str, what: &str) -> PathBuf {
-        let key = format!("{subject} {what} {} {}", rayon::current_num_threads(), super::machine());
+        let key = format!("{subject} {what} {} {}", rayon::current_num_threads(), super::facts::processor());
         self.0.join(&digest(key.as_bytes())[..32])
     }
 }

@@ -1,16 +1,20 @@
 //! A scene as one method renders it.
 
 use super::method::Method;
+use super::turn::processor_seconds;
 use super::{Options, Shot};
 use crate::check::key::{digest, scene_hash};
 use crate::check::reference;
-use crate::pictures::{Rendered, Source, one_line, read, render};
-use lucerna_core::render::FilmStore;
+use crate::pictures::{Source, one_line, read};
+#[cfg(doc)]
+use lucerna_core::interfaces::Sampler;
+use lucerna_core::render::{Budget, Control, FilmStore, PassEnd, RenderContext};
 use lucerna_core::scene::write::{WriteOptions, to_xml};
 use lucerna_core::scene::{ObjectKind, Parameter, Registry, Scene, Value, instantiate};
 use serde_json::json;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock};
 
 /// Memory of the largest picture in MiB, as of `render`.
 const MOST_MIB: u64 = 16_384;
@@ -113,31 +117,124 @@ impl Subject {
         sampler.round_spp(low.max(1))
     }
 
-    /// Renders pictures with one seed and these numbers of samples per pixel, each from the beginning.
+    /// Whether another renderer renders it.
+    pub fn is_peer(&self) -> bool {
+        self.peer.is_some()
+    }
+
+    /// Whether the picture of fewer samples can be taken from a run on its way: see [`Sampler::is_sequence`].
+    pub fn is_sequence(&self) -> bool {
+        self.peer.is_none() && self.scene.sensors()[0].sampler.is_sequence()
+    }
+
+    /// Renders pictures with one seed and these numbers of samples per pixel.
     ///
     /// # Errors
     /// If the renderer gives up; one line.
     pub fn render(&self, counts: &[u32], seed: u32) -> Result<Vec<Shot>, String> {
-        match &self.peer {
-            Some(peer) => {
-                let (size, variant) = (self.size(), &peer.variant);
-                let answers = reference::render_text(&self.path, &peer.text, variant, counts, seed, size)
-                    .map_err(|e| joined(&e))?;
-                let shots = answers.into_iter().zip(counts);
-                Ok(shots.map(|((image, seconds), spp)| Shot { spp: *spp, seconds, image }).collect())
-            }
-            None => counts.iter().map(|spp| self.render_here(*spp, seed)).collect(),
-        }
+        let mut shots = Vec::new();
+        self.render_each(counts, seed, false, &mut |shot| {
+            shots.push(shot);
+            Ok(())
+        })?;
+        shots.sort_by_key(|shot| shot.spp);
+        Ok(shots)
     }
 
-    fn render_here(&self, spp: u32, seed: u32) -> Result<Shot, String> {
-        let Rendered { image, seconds, .. } = render(&self.scene, spp, seed, |_| ()).map_err(|e| joined(&e.0))?;
-        Ok(Shot { spp, seconds, image })
+    /// As [`render`](Self::render), handing each picture over as soon as it is there, in no order. `alone`: no other work is
+    /// done in this process, whose processor time is the run's.
+    ///
+    /// # Errors
+    /// As [`render`](Self::render), or what `take` gives.
+    pub fn render_each(&self, counts: &[u32], seed: u32, alone: bool, take: Take<'_>) -> Result<(), String> {
+        let Some(peer) = &self.peer else {
+            let mut left = counts.to_vec();
+            while let Some(most) = left.iter().copied().max() {
+                let seen = self.render_here(&left, most, seed, alone, take)?;
+                left.retain(|spp| !seen.contains(spp));
+            }
+            return Ok(());
+        };
+        let answer = reference::render_text(&self.path, &peer.text, &peer.variant, counts, seed, self.size());
+        let answer = answer.map_err(|e| joined(&e))?;
+        for (timed, spp) in answer.pictures.into_iter().zip(counts) {
+            let (image, seconds, cpu) = (timed.image, timed.seconds, timed.cpu);
+            take(Shot { spp: *spp, of: *spp, seconds, cpu, memory: answer.peak_mib, image })?;
+        }
+        Ok(())
+    }
+
+    /// One run of `most` samples per pixel; the pictures of fewer are taken on the way where the sampler and the passes
+    /// allow it. Gives what was taken.
+    fn render_here(
+        &self,
+        counts: &[u32],
+        most: u32,
+        seed: u32,
+        alone: bool,
+        take: Take<'_>,
+    ) -> Result<Vec<u32>, String> {
+        let integrator = self.scene.integrator().ok_or("the scene has no integrator")?;
+        let camera = &self.scene.sensors()[0];
+        let channels = integrator.aov_names();
+        let early = |spp: u32| self.is_sequence() && spp < most && counts.contains(&spp);
+        let clock = alone.then(ProcessorClock::start);
+        let state = Mutex::new((Vec::new(), Ok(()), take, clock));
+        let look = |pass: PassEnd<'_>| {
+            if !early(pass.spp) {
+                return ControlFlow::Continue(());
+            }
+            let Ok(mut state) = state.lock() else { return ControlFlow::Break(()) };
+            let (seen, result, take, clock) = &mut *state;
+            let cpu = clock.as_ref().and_then(ProcessorClock::seconds);
+            let image = pass.picture();
+            *result = take(Shot { spp: pass.spp, of: most, seconds: pass.seconds, cpu, memory: None, image });
+            seen.push(pass.spp);
+            if let Some(clock) = clock {
+                clock.leave_out_since(cpu);
+            }
+            if result.is_ok() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        };
+        let control = Control::new().with_pass_end(&look);
+        let budget = Budget::Samples(most);
+        let mut cx = RenderContext::new(&self.scene, camera, budget, seed, &control, channels);
+        integrator.render(&mut cx).map_err(|e| joined(&e.0))?;
+        let (seconds, image) = (control.seconds(), cx.picture());
+        drop(cx);
+        let (mut seen, result, take, clock) = state.into_inner().map_err(|_| "a run was lost")?;
+        result?;
+        let cpu = clock.and_then(|clock| clock.seconds());
+        take(Shot { spp: most, of: most, seconds, cpu, memory: None, image })?;
+        seen.push(most);
+        Ok(seen)
+    }
+}
+
+/// Takes a picture.
+pub type Take<'a> = &'a mut (dyn FnMut(Shot) -> Result<(), String> + Send);
+
+/// Processor time since the start, less what is left out.
+struct ProcessorClock(Option<f64>);
+
+impl ProcessorClock {
+    fn start() -> Self {
+        ProcessorClock(processor_seconds())
+    }
+
+    fn seconds(&self) -> Option<f64> {
+        Some(processor_seconds()? - self.0?)
+    }
+
+    /// What was spent since the clock showed `then` does not count.
+    fn leave_out_since(&mut self, then: Option<f64>) {
+        if let (Some(now), Some(then), Some(start)) = (self.seconds(), then, &mut self.0) {
+            *start += now - then;
+        }
     }
 }
 
 /// A hash of the running program: what another build rendered is not taken for what this one would.
-fn program() -> &'static str {
+pub fn program() -> &'static str {
     static HASH: OnceLock<String> = OnceLock::new();
     HASH.get_or_init(|| {
         let bytes = std::env::current_exe().and_then(std::fs::read);
@@ -145,6 +242,7 @@ fn program() -> &'static str {
     })
 }
 
-fn joined(text: &str) -> String {
+/// A text of several lines as one.
+pub fn joined(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }

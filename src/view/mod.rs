@@ -18,7 +18,6 @@ pub use live::{Facts, Page};
 pub use reference::Reference;
 pub use summary::{Summary, tell_bad_samples};
 
-use lucerna_core::image::Image;
 use lucerna_core::interfaces::FilmSettings;
 use lucerna_core::render::{FilmStore, PassEnd, Progress, Report};
 use lucerna_core::stats::doublings::{Doublings, FEWEST};
@@ -147,7 +146,7 @@ impl Views {
         if let Some(tev) = &self.wanted.tev
             && tev.is_ready()
         {
-            tev.send(developed(end.store, end.film));
+            tev.send(end.store.picture(end.film));
         }
         if let Some(page) = &self.wanted.page {
             page.pass(end.spp, end.seconds, estimate);
@@ -205,7 +204,7 @@ impl Views {
             page.show(report.spp, store.size().to_array(), &picture());
         }
         if let Some(tev) = &self.wanted.tev {
-            tev.finish(developed(store, film));
+            tev.finish(store.picture(film));
         }
         summary
     }
@@ -224,11 +223,4 @@ fn rgb_of(store: &FilmStore) -> Vec<f32> {
     let size = store.size();
     let pixels = (0..size.y).flat_map(|y| (0..size.x).map(move |x| (x, y)));
     pixels.flat_map(|(x, y)| store.pixel(x, y).rgb.to_array()).collect()
-}
-
-/// The picture with all its channels.
-fn developed(store: &FilmStore, film: &FilmSettings) -> Image {
-    let (channels, data) = store.develop(film);
-    let size = store.size();
-    Image { width: size.x, height: size.y, channels, data }
 }

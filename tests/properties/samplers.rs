@@ -284,6 +284,23 @@ fn hc_x05_the_last_sample_and_dimension_work() {
     }
 }
 
+/// Samplers that say so, and no others, begin a long run with the numbers of a short one.
+#[test]
+fn sequences_begin_alike() {
+    for claim in &CLAIMS {
+        let [short, long] = [claim.spp, 4 * claim.spp].map(|spp| Run::new(claim.plugin, spp, SEED));
+        let numbers = |run: &Run| {
+            let samples = (0..claim.spp).flat_map(|sample| {
+                let pixel = UVec2::new(3, 9);
+                (0..4).map(move |i| (run.single(pixel, sample, i), run.pair(pixel, sample, i)))
+            });
+            samples.collect::<Vec<_>>()
+        };
+        let is_sequence = sampler(&source(claim.plugin, claim.spp)).is_sequence();
+        assert_eq!(numbers(&short) == numbers(&long), is_sequence, "{}", claim.plugin);
+    }
+}
+
 #[test]
 fn seeds_give_other_numbers() {
     for claim in CLAIMS {

@@ -18,6 +18,12 @@ pub trait Sampler: Send + Sync {
         asked.max(1)
     }
 
+    /// Whether the numbers of a sample do not depend on how many there will be: then the first samples of a long run are a
+    /// short one, and its picture can be looked at on the way.
+    fn is_sequence(&self) -> bool {
+        false
+    }
+
     /// The point set for a run, or `None` for independent numbers. `spp` is what
     /// [`round_spp`](Self::round_spp) gave.
     fn point_set(&self, seed: u32, spp: u32, film_size: UVec2) -> Option<Box<dyn PointSet>>;

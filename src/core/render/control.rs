@@ -1,6 +1,7 @@
 //! How long to render, and how to be told and stopped meanwhile.
 
 use super::FilmStore;
+use crate::image::Image;
 use crate::interfaces::FilmSettings;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -55,6 +56,13 @@ pub struct PassEnd<'r> {
     pub film: &'r FilmSettings,
     /// The sums so far.
     pub store: &'r FilmStore,
+}
+
+impl PassEnd<'_> {
+    /// The picture so far.
+    pub fn picture(&self) -> Image {
+        self.store.picture(self.film)
+    }
 }
 
 /// Looks at the picture between passes, and may end the run.

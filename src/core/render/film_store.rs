@@ -2,6 +2,7 @@
 
 use super::Window;
 use crate::color::Rgb;
+use crate::image::Image;
 use crate::interfaces::{FilmSettings, PixelFormat, Radiance, Rfilter};
 use crate::math::{UVec2, Vec2};
 use glam::IVec2;
@@ -101,7 +102,13 @@ impl FilmStore {
         Radiance { rgb: Rgb::new(value(0), value(1), value(2)), alpha: value(3), rays: 0 }
     }
 
-    /// The finished picture: names of the channels, and interleaved values row by row. Channels are those of the
+    /// The finished picture, with channels as [`develop`](Self::develop) gives them.
+    pub fn picture(&self, film: &FilmSettings) -> Image {
+        let (channels, data) = self.develop(film);
+        Image { width: self.size.x, height: self.size.y, channels, data }
+    }
+
+    /// The values of the finished picture: names of the channels, and interleaved values row by row. Channels are those of the
     /// film's pixel format; if there are AOVs, they follow.
     pub fn develop(&self, film: &FilmSettings) -> (Vec<String>, Vec<f32>) {
         type Append = fn(Radiance, &mut Vec<f32>);

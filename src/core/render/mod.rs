@@ -98,9 +98,7 @@ impl<'a> RenderContext<'a> {
 
     /// The picture as it is now.
     pub fn picture(&self) -> Image {
-        let (channels, data) = self.store.develop(&self.film);
-        let size = self.store.size();
-        Image { width: size.x, height: size.y, channels, data }
+        self.store.picture(&self.film)
     }
 
     /// The reference's order of random numbers, if it is asked for.

@@ -10,11 +10,11 @@
 //! | relMSE trimmed | the same without the 0.1 % of pixels where it is largest, at least one | 0.01 | |
 //! | MAPE | mean abs(x − r) / (abs r + ε) | 0.01 | common; ε differs between papers |
 //! | SMAPE | mean abs(x − r) / (abs x + abs r + ε), at most 1 | 0.01 | common; ε and a factor of 2 differ between papers |
-//! | bias² | see [`Seeds::bias_squared`] | | |
+//! | bias² | see [`bias_squared`] | | |
 //! | efficiency | 1 / (error · seconds) | | Pharr, Jakob and Humphreys 2023, section 2.2, there with the variance |
 //!
 //! ε is in units of radiance (its square for relMSE): it is as good as nothing where pictures are about as bright as 1.
-//! FLIP (Andersson et al. 2020), which is about how differences look, is not among them.
+//! FLIP has a file of its own, [`super::flip`]. `tests/metrics` compares with implementations that are not ours.
 
 use super::student::critical_t;
 
@@ -141,6 +141,13 @@ impl Interval {
         Some(Interval { value: log.value.exp(), bounds: log.bounds.map(|bounds| bounds.map(f64::exp)) })
     }
 
+    /// Of an estimate that is no mean, from those without each of the values in turn (Tukey's jackknife 1958).
+    pub fn of_jackknife(whole: f64, without: &[f64]) -> Self {
+        let n = without.len() as f64;
+        let pseudo: Vec<f64> = without.iter().map(|v| n * whole - (n - 1.0) * v).collect();
+        Interval::with_error(whole, standard_error(&pseudo), n - 1.0)
+    }
+
     /// Whether a value is outside of the bounds.
     pub fn excludes(&self, value: f64) -> bool {
         self.bounds.is_some_and(|[low, high]| value < low || value > high)
@@ -211,14 +218,27 @@ impl Seeds {
     pub fn variance(&self) -> Option<f64> {
         (self.count >= 2).then(|| finite_mean(self.squares.iter().map(|m2| m2 / (self.count as f64 - 1.0))))
     }
+}
 
-    /// Mean over the values of the squared bias: mean (m − r)² − σ²/n − σ_r², with m the mean of n pictures, σ² the variance
-    /// of one, and σ_r² that of the reference. Unbiased itself, and so negative about as often as not where there is no
-    /// bias. `None` of fewer than two pictures.
-    pub fn bias_squared(&self, reference: &[f32], variance_of_reference: f64) -> Option<f64> {
-        let noise = self.variance()? / self.count as f64;
-        let squares = self.mean.iter().zip(reference).map(|(m, r)| (m - f64::from(*r)).powi(2));
-        Some(finite_mean(squares) - noise - variance_of_reference)
+/// What one picture x of several adds to the squared bias of their mean m: mean (x − r)² and mean (x − r)(m − r).
+pub fn bias_terms(image: &[f32], mean: &[f32], reference: &[f32]) -> [f64; 2] {
+    let differences = || image.iter().zip(mean).zip(reference).map(|((x, m), r)| [x - r, m - r].map(f64::from));
+    [finite_mean(differences().map(|[x, _]| x * x)), finite_mean(differences().map(|[x, m]| x * m))]
+}
+
+/// Mean squared bias with an interval, from [`bias_terms`] of all pictures. It is the mean of (xᵢ − r)(xⱼ − r) over all
+/// pairs of pictures, less what the noise of the reference adds. `None` of fewer than two pictures.
+pub fn bias_squared(terms: &[[f64; 2]], variance_of_reference: f64) -> Option<Interval> {
+    let n = terms.len() as f64;
+    let (own, of_mean) = (terms.iter().map(|t| t[0]).sum::<f64>(), terms.iter().map(|t| t[1]).sum::<f64>() / n);
+    let of_pairs = |sum_squared: f64, own: f64, n: f64| (sum_squared - own) / (n * (n - 1.0)) - variance_of_reference;
+    let whole = of_pairs(n * n * of_mean, own, n);
+    // The sum of the others is n(m − r) − (x − r).
+    let without = |t: &[f64; 2]| of_pairs(n * n * of_mean - 2.0 * n * t[1] + t[0], own - t[0], n - 1.0);
+    match terms.len() {
+        0 | 1 => None,
+        2 => Some(Interval { value: whole, bounds: None }),
+        _ => Some(Interval::of_jackknife(whole, &terms.iter().map(without).collect::<Vec<_>>())),
     }
 }
 
@@ -289,16 +309,24 @@ mod tests {
         let pixels = 20_000;
         let reference = vec![1.0_f32; pixels];
         for bias in [0.0_f32, 0.1] {
-            let (mut seeds, mut mse) = (Seeds::default(), 0.0);
+            let (mut seeds, mut mse, mut images) = (Seeds::default(), 0.0, Vec::new());
             for _ in 0..4 {
                 let image: Vec<f32> = (0..pixels).map(|_| 0.8 + bias + 0.4 * pcg.next_f32()).collect();
                 mse += errors(&image, &reference, 1).unwrap().mse / 4.0;
                 seeds.add(&image).unwrap();
+                images.push(image);
             }
-            let (variance, found) = (seeds.variance().unwrap(), seeds.bias_squared(&reference, 0.0).unwrap());
+            let mean = seeds.mean();
+            let terms: Vec<[f64; 2]> = images.iter().map(|image| bias_terms(image, &mean, &reference)).collect();
+            let (variance, found) = (seeds.variance().unwrap(), bias_squared(&terms, 0.0).unwrap());
             assert!((variance - 0.04 / 3.0).abs() < 2e-4, "{variance}");
-            assert!((found - f64::from(bias * bias)).abs() < 3e-4, "{found}");
-            assert!((mse - variance - found).abs() < 1e-9, "{mse}");
+            assert!((found.value - f64::from(bias * bias)).abs() < 3e-4, "{found:?}");
+            assert!((mse - variance - found.value).abs() < 1e-8, "{mse}");
+            // The spread over the pictures tells how well it is known, here to about 1e-4.
+            let [low, high] = found.bounds.unwrap();
+            assert!(high - low < 2e-3 && !found.excludes(f64::from(bias * bias)), "{found:?}");
+            assert_eq!(bias_squared(&terms[..1], 0.0), None);
+            assert_eq!(bias_squared(&terms, 0.5).unwrap().value, found.value - 0.5);
         }
     }
 
@@ -327,6 +355,10 @@ mod tests {
         let ratio = Interval::of_ratio(&[1.2, 12.0, 2.4], &[1.0, 10.0, 2.0]).unwrap();
         assert!(close(ratio.value, 1.2) && ratio.excludes(1.0));
         assert_eq!(Interval::of_ratio(&[0.0], &[1.0]), None);
+        // Of a mean, the jackknife gives what Student does.
+        let values = [1.0, 2.0, 6.0];
+        let without = [0, 1, 2].map(|i| (9.0 - values[i]) / 2.0);
+        assert_eq!(Interval::of_jackknife(3.0, &without), Interval::of_mean(&values));
     }
 
     /// The interval holds the true mean in about 95 of 100 cases.
