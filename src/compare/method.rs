@@ -15,6 +15,8 @@ pub struct Method {
     pub variant: Option<String>,
     /// Another integrator.
     pub integrator: Option<Node>,
+    /// Decisions nested in the integrator.
+    pub decisions: Vec<Node>,
     /// Another sampler.
     pub sampler: Option<Node>,
     /// Values for the scene's `$name`.
@@ -91,7 +93,8 @@ fn located(content: &str, error: &toml::de::Error) -> String {
 }
 
 impl Method {
-    /// Of a short form: `path`, `path:max_depth=4,sampler=sobol`, `scene`, `mitsuba:llvm_ad_rgb:path`.
+    /// Of a short form: `path`, `path:max_depth=4,sampler=sobol`, `path+guide=sd_tree:startup=4`, `scene`,
+    /// `mitsuba:llvm_ad_rgb:path`.
     ///
     /// # Errors
     /// If it is none.
@@ -103,23 +106,28 @@ impl Method {
             }
             None => (None, text),
         };
-        let mut node = parse(ObjectKind::Integrator, rest, "--methods")?;
+        let mut parts = rest.split('+');
+        let mut node = parse(ObjectKind::Integrator, parts.next().unwrap_or(""), "--methods")?;
+        let decisions = parts.map(|part| decision(text, part)).collect::<Result<Vec<_>, _>>()?;
+        if variant.is_some() && !decisions.is_empty() {
+            return Err(format!("--methods {text}: the reference has no such decisions"));
+        }
         let sampler = match node.take("sampler").map(|p| p.value) {
             Some(Value::String(name)) => Some(parse(ObjectKind::Sampler, &name, "--methods")?),
             Some(_) => return Err(format!("--methods {text}: sampler must be the name of one")),
             None => None,
         };
-        let names = variant.iter().chain([&node.plugin]).chain(sampler.iter().map(|s| &s.plugin));
+        let names = variant.iter().chain([&node.plugin]).chain(sampler.iter().chain(&decisions).map(|s| &s.plugin));
         if !names.into_iter().all(|name| is_name(name)) {
             return Err(format!(
-                "--methods {text}: expected scene, INTEGRATOR, INTEGRATOR:parameter=value,sampler=NAME, mitsuba:VARIANT:INTEGRATOR, or a .toml file"
+                "--methods {text}: expected scene, INTEGRATOR, INTEGRATOR:parameter=value,sampler=NAME, INTEGRATOR+guide=NAME, mitsuba:VARIANT:INTEGRATOR, or a .toml file"
             ));
         }
         if node.plugin == "scene" && !node.parameters.is_empty() {
             return Err(format!("--methods {text}: \"scene\" takes no parameters but sampler"));
         }
         let integrator = (node.plugin != "scene").then_some(node);
-        Ok(Method { name: text.to_owned(), variant, integrator, sampler, defines: Vec::new() })
+        Ok(Method { name: text.to_owned(), variant, integrator, decisions, sampler, defines: Vec::new() })
     }
 
     fn of_entry(entry: Entry) -> Result<Self, String> {
@@ -156,6 +164,7 @@ impl Method {
         };
         let mut parts = vec![self.variant.as_ref().map_or("Lucerna".to_owned(), |v| format!("mitsuba {v}"))];
         parts.push(self.integrator.as_ref().map_or("the scene's integrator".to_owned(), short));
+        parts.extend(self.decisions.iter().map(|d| format!("{} {}", d.kind.tag(), short(d))));
         parts.extend(self.sampler.as_ref().map(|s| format!("sampler {}", short(s))));
         parts.extend(self.defines.iter().map(|(name, value)| format!("${name} = {value}")));
         parts.join(", ")
@@ -167,6 +176,12 @@ impl Method {
         let root = description.root;
         if let Some(wanted) = &self.integrator {
             replace(description, root, wanted, registry);
+        }
+        let is_integrator = |node: &Node| node.kind == ObjectKind::Integrator;
+        let integrators: Vec<_> =
+            (description.children(root).map(|(_, id)| id)).filter(|id| is_integrator(description.node(*id))).collect();
+        for (integrator, wanted) in integrators.iter().flat_map(|id| self.decisions.iter().map(move |d| (*id, d))) {
+            replace(description, integrator, wanted, registry);
         }
         if let Some(wanted) = &self.sampler {
             let is_sensor = |node: &Node| node.kind == ObjectKind::Sensor;
@@ -205,6 +220,16 @@ fn replace(description: &mut Description, parent: lucerna_core::scene::NodeId, w
     parameters.push(Parameter { name, value: Value::Object(id), at });
 }
 
+/// A decision in short form: `guide=sd_tree:startup=4`.
+fn decision(text: &str, part: &str) -> Result<Node, String> {
+    const KINDS: [ObjectKind; 4] =
+        [ObjectKind::Guide, ObjectKind::LightSampler, ObjectKind::Roulette, ObjectKind::Cache];
+    let (tag, plugin) = part.split_once('=').unwrap_or((part, ""));
+    let kind = KINDS.into_iter().find(|kind| kind.tag() == tag);
+    let kind = kind.ok_or_else(|| format!("--methods {text}: \"{tag}\" is no decision, such as guide"))?;
+    parse(kind, plugin, "--methods")
+}
+
 fn plain_text(value: &Value) -> String {
     match value {
         Value::Integer(v) => v.to_string(),
@@ -229,8 +254,19 @@ mod tests {
         assert_eq!(method.describe(), "Lucerna, path:max_depth=4, sampler sobol");
         let peer = Method::of_text("mitsuba:llvm_ad_rgb:path").unwrap();
         assert_eq!(peer.describe(), "mitsuba llvm_ad_rgb, path");
+        let guided = Method::of_text("path:max_depth=4+guide=sd_tree:startup=2").unwrap();
+        assert_eq!(guided.describe(), "Lucerna, path:max_depth=4, guide sd_tree:startup=2");
         assert_eq!(Method::of_text("scene").unwrap().integrator, None);
-        for wrong in ["", "path:max_depth", "a b", "mitsuba:", "scene:max_depth=3", "path:sampler=3"] {
+        for wrong in [
+            "",
+            "path:max_depth",
+            "a b",
+            "mitsuba:",
+            "scene:max_depth=3",
+            "path:sampler=3",
+            "path+guide",
+            "path+bsdf=glass",
+        ] {
             let message = Method::of_text(wrong).unwrap_err();
             assert!(message.starts_with("--methods") && !message.contains('\n'), "{message}");
         }

@@ -3,6 +3,7 @@
 
 mod corrupted;
 mod determinism;
+mod field;
 #[path = "../support/mod.rs"]
 mod support;
 mod unbiased;

@@ -9,7 +9,7 @@
 //!
 //! | parameter | type | default | meaning |
 //! |---|---|---|---|
-//! | `spatial_threshold` | float | 4000 | a cell of space is halved with more records than this times √(samples per pixel of the iteration) |
+//! | `spatial_threshold` | float | 1000 | a cell of space is halved with more records than this times √(samples per pixel of the iteration) |
 //! | `directional_threshold` | float | 0.01 | a cell of directions is divided with more than this part of the flux |
 //! | `directional_depth` | integer | 20 | levels of quadtrees at most, from 3 to 20 |
 //! | `spatial_filter` | string | stochastic | records go to the cell they lie in (`nearest`), to one in a box about it (`stochastic`), or to all of the `box` by volume |
@@ -54,7 +54,7 @@ pub const PLUGIN: Plugin = Plugin {
     aliases: &[],
     summary: "learns incident light in a tree over space and directions",
     params: &[&[
-        Param::float("spatial_threshold", 4000.0, "records after which a cell of space is halved").at_least(1.0),
+        Param::float("spatial_threshold", 1000.0, "records after which a cell of space is halved").at_least(1.0),
         Param::float("directional_threshold", 0.01, "part of the flux above which a cell of directions is divided")
             .range(1e-6, 1.0),
         Param::int("directional_depth", 20, "levels of quadtrees at most").range(3.0, 20.0),
