@@ -109,6 +109,7 @@ fn described(source: &Source) -> (Description, NodeId) {
     let example = source.example();
     let around = match source.kind() {
         ObjectKind::Film | ObjectKind::Sampler => ["<sensor type='perspective'>", "</sensor>"],
+        ObjectKind::Guide => ["<integrator type='path'>", "</integrator>"],
         ObjectKind::Rfilter => ["<sensor type='perspective'><film type='hdrfilm'>", "</film></sensor>"],
         _ => ["", ""],
     };

@@ -16,8 +16,8 @@ use std::process::ExitCode;
 
 /// Told at the end of the help.
 const EXAMPLES: &str = "\
-Methods: `path`, `direct`, `path:max_depth=4`, `path:sampler=sobol`, `path:light_sampler=power`, `scene` (as the scene has
-it), `mitsuba:llvm_ad_rgb:path` (with the reference renderer), or a file such as
+Methods: `path`, `direct`, `path:max_depth=4`, `path:sampler=sobol`, `path+guide=sd_tree`, `path+light_sampler=power`,
+`scene` (as the scene has it), `mitsuba:llvm_ad_rgb:path` (with the reference renderer), or a file such as
 
     baseline = \"two bounces\"
     [[method]]
@@ -26,6 +26,7 @@ it), `mitsuba:llvm_ad_rgb:path` (with the reference renderer), or a file such as
     parameters = { max_depth = 3 }
     sampler = \"multijitter\"
     light_sampler = \"light_tree\"
+    # guide = \"sd_tree\"
     define = { power = \"2\" }            # the scene's $power
     # renderer = \"mitsuba:scalar_rgb\"
 

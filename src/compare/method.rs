@@ -15,10 +15,10 @@ pub struct Method {
     pub variant: Option<String>,
     /// Another integrator.
     pub integrator: Option<Node>,
+    /// Decisions nested in the integrator.
+    pub decisions: Vec<Node>,
     /// Another sampler.
     pub sampler: Option<Node>,
-    /// Another way for its integrators to choose lights.
-    pub light_sampler: Option<Node>,
     /// Values for the scene's `$name`.
     pub defines: Vec<(String, String)>,
 }
@@ -52,6 +52,8 @@ struct Entry {
     integrator: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     sampler: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    guide: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     light_sampler: Option<String>,
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
@@ -109,13 +111,15 @@ impl Entry {
             Value::Boolean(v) => toml::Value::Boolean(*v),
             other => toml::Value::String(plain_text(other)),
         };
+        let decision = |kind| method.decisions.iter().find(|node| node.kind == kind).map(short);
         let parameters = method.integrator.iter().flat_map(|node| &node.parameters);
         Entry {
             name: method.name.clone(),
             renderer: method.variant.as_ref().map(|variant| format!("mitsuba:{variant}")),
             integrator: method.integrator.as_ref().map(|node| node.plugin.clone()),
             sampler: method.sampler.as_ref().map(short),
-            light_sampler: method.light_sampler.as_ref().map(short),
+            guide: decision(ObjectKind::Guide),
+            light_sampler: decision(ObjectKind::LightSampler),
             parameters: parameters.map(|p| (p.name.clone(), value(&p.value))).collect(),
             define: method.defines.iter().cloned().collect(),
         }
@@ -136,7 +140,8 @@ fn located(content: &str, error: &toml::de::Error) -> String {
 }
 
 impl Method {
-    /// Of a short form: `path`, `path:max_depth=4,sampler=sobol,light_sampler=power`, `scene`, `mitsuba:llvm_ad_rgb:path`.
+    /// Of a short form: `path`, `path:max_depth=4,sampler=sobol`, `path+guide=sd_tree:startup=4+light_sampler=power`,
+    /// `scene`, `mitsuba:llvm_ad_rgb:path`. A light sampler may also stand among the parameters.
     ///
     /// # Errors
     /// If it is none.
@@ -148,25 +153,30 @@ impl Method {
             }
             None => (None, text),
         };
-        let mut node = parse(ObjectKind::Integrator, rest, "--methods")?;
+        let mut parts = rest.split('+');
+        let mut node = parse(ObjectKind::Integrator, parts.next().unwrap_or(""), "--methods")?;
         let mut plugin_of = |kind: ObjectKind| match node.take(kind.tag()).map(|p| p.value) {
             Some(Value::String(name)) => Ok(Some(parse(kind, &name, "--methods")?)),
             Some(_) => Err(format!("--methods {text}: {} must be the name of one", kind.tag())),
             None => Ok(None),
         };
         let (sampler, light_sampler) = (plugin_of(ObjectKind::Sampler)?, plugin_of(ObjectKind::LightSampler)?);
-        let decisions = sampler.iter().chain(&light_sampler).map(|node| &node.plugin);
-        let names = variant.iter().chain([&node.plugin]).chain(decisions);
+        let mut decisions = parts.map(|part| decision(text, part)).collect::<Result<Vec<_>, _>>()?;
+        decisions.extend(light_sampler);
+        if variant.is_some() && !decisions.is_empty() {
+            return Err(format!("--methods {text}: the reference has no such decisions"));
+        }
+        let names = variant.iter().chain([&node.plugin]).chain(sampler.iter().chain(&decisions).map(|s| &s.plugin));
         if !names.into_iter().all(|name| is_name(name)) {
             return Err(format!(
-                "--methods {text}: expected scene, INTEGRATOR, INTEGRATOR:parameter=value,sampler=NAME, mitsuba:VARIANT:INTEGRATOR, or a .toml file"
+                "--methods {text}: expected scene, INTEGRATOR, INTEGRATOR:parameter=value,sampler=NAME, INTEGRATOR+guide=NAME, mitsuba:VARIANT:INTEGRATOR, or a .toml file"
             ));
         }
         if node.plugin == "scene" && !node.parameters.is_empty() {
             return Err(format!("--methods {text}: \"scene\" takes no parameters but sampler and light_sampler"));
         }
         let integrator = (node.plugin != "scene").then_some(node);
-        Ok(Method { name: text.to_owned(), variant, integrator, sampler, light_sampler, defines: Vec::new() })
+        Ok(Method { name: text.to_owned(), variant, integrator, decisions, sampler, defines: Vec::new() })
     }
 
     fn of_entry(entry: Entry) -> Result<Self, String> {
@@ -178,9 +188,10 @@ impl Method {
         if let Some(sampler) = entry.sampler {
             method.sampler = Some(parse(ObjectKind::Sampler, &sampler, "sampler")?);
         }
-        if let Some(light_sampler) = entry.light_sampler {
-            method.light_sampler = Some(parse(ObjectKind::LightSampler, &light_sampler, "light_sampler")?);
-        }
+        let guide = entry.guide.map(|text| parse(ObjectKind::Guide, &text, "guide")).transpose()?;
+        let light_sampler = entry.light_sampler.map(|text| parse(ObjectKind::LightSampler, &text, "light_sampler"));
+        method.decisions.extend(guide);
+        method.decisions.extend(light_sampler.transpose()?);
         if !entry.parameters.is_empty() {
             let node = method.integrator.as_mut().ok_or("parameters need an integrator")?;
             for (name, value) in entry.parameters {
@@ -201,8 +212,8 @@ impl Method {
     pub fn describe(&self) -> String {
         let mut parts = vec![self.variant.as_ref().map_or("Lucerna".to_owned(), |v| format!("mitsuba {v}"))];
         parts.push(self.integrator.as_ref().map_or("the scene's integrator".to_owned(), short));
+        parts.extend(self.decisions.iter().map(|d| format!("{} {}", d.kind.tag(), short(d))));
         parts.extend(self.sampler.as_ref().map(|s| format!("sampler {}", short(s))));
-        parts.extend(self.light_sampler.as_ref().map(|s| format!("light sampler {}", short(s))));
         parts.extend(self.defines.iter().map(|(name, value)| format!("${name} = {value}")));
         parts.join(", ")
     }
@@ -225,7 +236,7 @@ impl Method {
                 replace(description, sensor, wanted, registry);
             }
         }
-        self.light_sampler.as_ref().map_or(Ok(()), |wanted| decide(description, registry, wanted))
+        self.decisions.iter().try_for_each(|wanted| decide(description, registry, wanted))
     }
 }
 
@@ -255,6 +266,16 @@ fn replace(description: &mut Description, parent: lucerna_core::scene::NodeId, w
     parameters.push(Parameter { name, value: Value::Object(id), at });
 }
 
+/// A decision in short form: `guide=sd_tree:startup=4`.
+fn decision(text: &str, part: &str) -> Result<Node, String> {
+    const KINDS: [ObjectKind; 4] =
+        [ObjectKind::Guide, ObjectKind::LightSampler, ObjectKind::Roulette, ObjectKind::Cache];
+    let (tag, plugin) = part.split_once('=').unwrap_or((part, ""));
+    let kind = KINDS.into_iter().find(|kind| kind.tag() == tag);
+    let kind = kind.ok_or_else(|| format!("--methods {text}: \"{tag}\" is no decision, such as guide"))?;
+    parse(kind, plugin, "--methods")
+}
+
 fn plain_text(value: &Value) -> String {
     match value {
         Value::Integer(v) => v.to_string(),
@@ -279,8 +300,19 @@ mod tests {
         assert_eq!(method.describe(), "Lucerna, path:max_depth=4, sampler sobol");
         let peer = Method::of_text("mitsuba:llvm_ad_rgb:path").unwrap();
         assert_eq!(peer.describe(), "mitsuba llvm_ad_rgb, path");
+        let guided = Method::of_text("path:max_depth=4+guide=sd_tree:startup=2").unwrap();
+        assert_eq!(guided.describe(), "Lucerna, path:max_depth=4, guide sd_tree:startup=2");
         assert_eq!(Method::of_text("scene").unwrap().integrator, None);
-        for wrong in ["", "path:max_depth", "a b", "mitsuba:", "scene:max_depth=3", "path:sampler=3"] {
+        for wrong in [
+            "",
+            "path:max_depth",
+            "a b",
+            "mitsuba:",
+            "scene:max_depth=3",
+            "path:sampler=3",
+            "path+guide",
+            "path+bsdf=glass",
+        ] {
             let message = Method::of_text(wrong).unwrap_err();
             assert!(message.starts_with("--methods") && !message.contains('\n'), "{message}");
         }

@@ -55,7 +55,7 @@ impl Subject {
         let text = to_xml(&description, &WriteOptions { for_reference, folder: None });
         let peer = match &method.variant {
             Some(variant) => {
-                for node in method.integrator.iter().chain(&method.sampler).chain(&method.light_sampler) {
+                for node in method.integrator.iter().chain(&method.sampler).chain(&method.decisions) {
                     if !text.contains(&format!("type=\"{}\"", node.plugin)) {
                         return Err(format!("the reference has no {} \"{}\"", node.kind.tag(), node.plugin));
                     }
@@ -122,9 +122,11 @@ impl Subject {
         self.peer.is_some()
     }
 
-    /// Whether the picture of fewer samples can be taken from a run on its way: see [`Sampler::is_sequence`].
+    /// Whether the picture of fewer samples can be taken from a run on its way: see [`Sampler::is_sequence`]. What learns
+    /// plans for the samples it will have.
     pub fn is_sequence(&self) -> bool {
-        self.peer.is_none() && self.scene.sensors()[0].sampler.is_sequence()
+        let learns = self.scene.integrator().is_some_and(|integrator| integrator.estimator().is_none());
+        self.peer.is_none() && !learns && self.scene.sensors()[0].sampler.is_sequence()
     }
 
     /// Renders pictures with one seed and these numbers of samples per pixel.

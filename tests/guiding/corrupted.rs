@@ -1,5 +1,6 @@
 //! A guide that is wrong on purpose: it learns as `sd_tree` does, and spoils what is asked of it.
 
+use super::cone;
 use lucerna::core::interfaces::{
     Arena, Guide, GuideField, GuideLearner, GuideRecord, GuidedDirections, SurfaceHit, Training, mix,
 };
@@ -8,7 +9,7 @@ use lucerna::core::sampling::warp::square_to_sphere;
 use lucerna::core::scene::{
     Built, Constructor, Description, Location, Node, Object, ObjectKind, Param, Plugin, Properties, build_one,
 };
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::PI;
 use std::sync::Arc;
 
 /// Ways to be wrong.
@@ -134,14 +135,6 @@ fn octant(d: Vec3) -> usize {
     usize::from(d.x < 0.0) + 2 * usize::from(d.y < 0.0) + 4 * usize::from(d.z < 0.0)
 }
 
-/// Uniform in the cone about +z.
-fn in_cone(u2: Vec2) -> Vec3 {
-    let z = 1.0 - u2.x * (1.0 - NARROW);
-    let (sin, cos) = (TAU * u2.y).sin_cos();
-    let r = (1.0 - z * z).max(0.0).sqrt();
-    Vec3::new(r * cos, r * sin, z)
-}
-
 /// Cosine of the cone that holds all of the one direction.
 const NARROW: f32 = 0.9999;
 
@@ -182,7 +175,7 @@ impl GuidedDirections for Spoilt<'_> {
                 Self::in_octant(chosen, Vec2::new(x, u2.y))
             }
             "inverted" => -self.inner.sample(u2).0,
-            "one_direction" => in_cone(u2),
+            "one_direction" => cone::sample(u2, NARROW),
             "one_cell" => Self::in_octant(5, u2),
             _ => self.inner.sample(u2).0,
         };
@@ -198,7 +191,7 @@ impl GuidedDirections for Spoilt<'_> {
             "inverted" => self.inner.pdf(-d),
             "one_direction" => {
                 if d.z >= NARROW {
-                    1.0 / (TAU * (1.0 - NARROW))
+                    cone::pdf(NARROW)
                 } else {
                     0.0
                 }

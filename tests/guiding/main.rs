@@ -1,8 +1,10 @@
 //! Guided paths: unbiased whatever was learnt, the same bits for any number of threads, densities that are those of the
 //! samples.
 
+mod cone;
 mod corrupted;
 mod determinism;
+mod field;
 #[path = "../support/mod.rs"]
 mod support;
 mod unbiased;

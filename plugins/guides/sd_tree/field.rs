@@ -65,7 +65,9 @@ struct Here<'g> {
     weights: [f32; CELLS],
     /// Sums of its rows.
     rows: [f32; EDGE],
-    /// One over the sum of all.
+    /// The sum of all.
+    total: f32,
+    /// What makes a density relative to a uniform one, per solid angle, of a weight.
     scale: f32,
 }
 
@@ -82,8 +84,8 @@ impl<'g> Here<'g> {
             *row = sum(cells);
         }
         let total = sum(&rows);
-        let scale = 1.0 / total;
-        (total > 0.0 && scale.is_finite()).then_some(Here { tree, p_guide, weights, rows, scale })
+        let scale = UNIFORM * CELLS as f32 / total;
+        (total > 0.0 && scale.is_finite()).then_some(Here { tree, p_guide, weights, rows, total, scale })
     }
 }
 
@@ -99,37 +101,35 @@ impl GuidedDirections for Here<'_> {
     }
 
     fn sample(&self, u2: Vec2) -> (Vec3, f32) {
-        let (row, y) = pick(&self.rows, f64::from(u2.y));
-        let (column, x) = pick(&self.weights.as_chunks::<EDGE>().0[row], f64::from(u2.x));
+        let (row, y) = pick(&self.rows, self.total, f64::from(u2.y));
+        let (column, x) = pick(&self.weights.as_chunks::<EDGE>().0[row], self.rows[row], f64::from(u2.x));
         let cell = EDGE * row + column;
         let (p, density) = self.tree.sample_in_cell(cell, [x, y]);
-        let relative = self.weights[cell] * self.scale * CELLS as f32;
-        (cylinder::to_direction(p), UNIFORM * relative * density)
+        (cylinder::to_direction(p), self.weights[cell] * self.scale * density)
     }
 
     fn pdf(&self, d: Vec3) -> f32 {
         let (cell, density) = self.tree.pdf_in_cell(cylinder::of_direction(d));
-        UNIFORM * self.weights[cell] * self.scale * CELLS as f32 * density
+        self.weights[cell] * self.scale * density
     }
 }
 
 /// An index by weight, and what is left of the number. Never one without weight, if there is any.
 #[inline]
-fn pick(weights: &[f32; EDGE], u: f64) -> (usize, f64) {
-    let total: f64 = weights.iter().map(|w| f64::from(*w)).sum();
-    let (mut low, target, mut last) = (0.0, u * total, (0, 0.0));
+fn pick(weights: &[f32; EDGE], total: f32, u: f64) -> (usize, f64) {
+    let mut rest = u * f64::from(total);
+    let mut last = 0;
     for (i, weight) in weights.iter().enumerate() {
         let weight = f64::from(*weight);
         if weight > 0.0 {
-            let rest = (target - low) / weight;
-            if rest < 1.0 {
-                return (i, rest.max(0.0));
+            if rest < weight {
+                return (i, rest / weight);
             }
-            last = (i, 1.0 - f64::EPSILON);
+            last = i;
         }
-        low += weight;
+        rest -= weight;
     }
-    last
+    (last, 1.0 - f64::EPSILON)
 }
 
 /// Normals are taken together in so many groups along each edge of the cylinder's square.

@@ -1,4 +1,19 @@
 //! Fills the tree with what paths found, and refines it between iterations.
+//!
+//! Published are Müller, Gross, Novák 2017, and Müller 2019 with its public code:
+//!
+//! | what | published | here |
+//! |---|---|---|
+//! | records until a cell is halved, times √samples | 12000, with filters 4000 | 1000: pictures here have fewer pixels |
+//! | part of the flux until directions are divided, depth | 0.01, 20 | the same |
+//! | upper levels of quadtrees | as the flux asks | always three, as a table that the cosine can weight |
+//! | filter of directions | cut off at the edges | goes round in the azimuth, is moved inside at the poles |
+//! | probability of the guide | any | from 0.05 to 0.95 if learnt, at most 0.95 if given |
+//! | gradient of that probability | as large as the radiance | over its mean, or the regularisation would depend on it |
+//! | descent: rate, decays, regularisation | 0.01, 0.9 and 0.999, 0.01 | the same |
+//! | light that emitter sampling finds | not learnt, or by its weight | by its weight |
+//! | weights of iterations | inverse mean variance of themselves | of the other half of the pixels |
+//! | iterations at the start, then | 8 of 1 sample, doubling | the same |
 
 use super::cylinder;
 use super::field::{Field, Leaf};

@@ -1,18 +1,17 @@
 //! Integrators and films.
 
-use super::super::description::{NodeId, ObjectKind, Value};
+use super::super::description::{NodeId, ObjectKind, Parameter, Value};
 use super::{Editor, number};
 
 /// The integrators that both times have.
 const KNOWN: [&str; 9] = ["path", "direct", "volpath", "volpathmis", "ptracer", "depth", "aov", "moment", "stokes"];
 
 /// Integrators of 0.x that today has no plugin for. In files of 0.x private ones are treated in the same way.
-const GONE: [&str; 16] = [
+const GONE: [&str; 15] = [
     "ao",
     "bdpt",
     "erpt",
     "field",
-    "guided_path",
     "mlt",
     "photonmapper",
     "ppm",
@@ -82,4 +81,58 @@ pub(super) fn file_format(editor: &mut Editor, node: NodeId) -> Option<String> {
 /// Integrators that ran another one give way to it.
 pub(super) fn unwrap_integrator(editor: &mut Editor, node: NodeId) -> Option<String> {
     editor.unwrap_child(node)
+}
+
+/// Reads the public plugin `guided_path` as `path` with the guide `sd_tree`, as that plugin is without its later
+/// extensions unless the scene asks for them.
+pub(super) fn guided_path(editor: &mut Editor, node: NodeId) -> Option<String> {
+    let guide = editor.add_beside(node, ObjectKind::Guide, "sd_tree");
+    let mut word = |name, fallback: &str| match editor.take(node, name) {
+        Some(Value::String(text)) => text.to_lowercase(),
+        _ => fallback.to_owned(),
+    };
+    let (nee, combination) = (word("nee", "never"), word("sample_combination", "automatic"));
+    let (spatial, directional) = (word("spatial_filter", "nearest"), word("directional_filter", "nearest"));
+    let (loss, budget_type) = (word("bsdf_sampling_fraction_loss", "none"), word("budget_type", "seconds"));
+    let mut number = |name, fallback| editor.take_number(node, name).unwrap_or(fallback);
+    let p_bsdf = number("bsdf_sampling_fraction", 0.5);
+    let (spatial_threshold, directional_threshold) =
+        (number("s_tree_threshold", 12000.0), number("d_tree_threshold", 0.01));
+    let (memory, budget) = (number("sd_tree_max_memory", -1.0), number("budget", -1.0));
+    let text = |text: &str| Value::String(text.to_owned());
+    editor.set(guide, "nee", text(&nee));
+    editor.set(guide, "spatial_filter", text(&spatial));
+    editor.set(guide, "directional_filter", text(&directional));
+    editor.set(guide, "combination", text(if combination == "inversevar" { "inverse_variance" } else { "last" }));
+    if loss == "none" {
+        editor.set(guide, "p_guide", Value::Float(1.0 - p_bsdf));
+    }
+    // It compares with the number times the square root of a quarter of the samples per pixel.
+    editor.set(guide, "spatial_threshold", Value::Float(0.5 * spatial_threshold));
+    editor.set(guide, "directional_threshold", Value::Float(directional_threshold));
+    if memory > 0.0 {
+        editor.set(guide, "max_memory", Value::Float(memory));
+    }
+    for (name, value) in [("direct", Value::Boolean(false)), ("startup", Value::Integer(0))] {
+        editor.set(guide, name, value);
+    }
+    for (name, value) in [("product", text("none")), ("roughness_threshold", Value::Float(0.0))] {
+        editor.set(guide, name, value);
+    }
+    match budget_type.as_str() {
+        "spp" if budget >= 1.0 && budget < f64::from(u32::MAX) => {
+            let samplers = editor.scene.nodes.iter().enumerate().filter(|(_, n)| n.kind == ObjectKind::Sampler);
+            let samplers: Vec<NodeId> = samplers.map(|(index, _)| NodeId(index as u32)).collect();
+            for sampler in samplers {
+                editor.set(sampler, "sample_count", Value::Integer(budget as i64));
+            }
+        }
+        "seconds" if budget > 0.0 => editor.set(node, "timeout", Value::Float(budget)),
+        _ => {}
+    }
+    let at = editor.scene.node(node).at.clone();
+    let integrator = editor.scene.node_mut(node);
+    integrator.plugin = "path".to_owned();
+    integrator.parameters.push(Parameter { name: "_guide".to_owned(), value: Value::Object(guide), at });
+    Some("integrator \"guided_path\" is read as \"path\" with the guide \"sd_tree\"".to_owned())
 }

@@ -61,6 +61,7 @@ pub(super) const TABLE: &[Row] = &[
 
     row(Integrator, &["irrcache", "adaptive", "multichannel"], With(others::unwrap_integrator), ""),
     row(Integrator, &["volpath_simple"], Plugin("volpath"), ""),
+    row(Integrator, &["guided_path"], With(others::guided_path), ""),
     row(Integrator, ALL, With(others::unknown_integrator), NEAREST),
     row(Integrator, &["direct"], Rename("luminaire_samples", "emitter_samples"), ""),
     row(Integrator, &["direct"], With(others::shading_samples), ""),

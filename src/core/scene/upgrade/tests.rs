@@ -53,6 +53,44 @@ fn names_in_snake_case() {
 }
 
 #[test]
+fn guided_path_with_all_its_parameters() {
+    for (old, new) in [
+        (
+            "<integrator type='guided_path'><integer name='maxDepth' value='12'/><integer name='rrDepth' value='5'/>\
+             <boolean name='strictNormals' value='true'/><boolean name='hideEmitters' value='true'/>\
+             <string name='nee' value='kickstart'/><string name='sampleCombination' value='inversevar'/>\
+             <string name='spatialFilter' value='stochastic'/><string name='directionalFilter' value='box'/>\
+             <string name='bsdfSamplingFractionLoss' value='kl'/><float name='bsdfSamplingFraction' value='0.3'/>\
+             <integer name='sTreeThreshold' value='4000'/><float name='dTreeThreshold' value='0.02'/>\
+             <integer name='sdTreeMaxMemory' value='32'/><integer name='sppPerPass' value='1'/>\
+             <boolean name='dumpSDTree' value='true'/><string name='budgetType' value='seconds'/>\
+             <float name='budget' value='60'/></integrator>",
+            "<integrator type='path'><integer name='max_depth' value='12'/><integer name='rr_depth' value='5'/>\
+             <boolean name='hide_emitters' value='true'/><float name='timeout' value='60'/>\
+             <guide name='_guide' type='sd_tree'><string name='nee' value='kickstart'/>\
+             <string name='spatial_filter' value='stochastic'/><string name='directional_filter' value='box'/>\
+             <string name='combination' value='inverse_variance'/><float name='spatial_threshold' value='2000'/>\
+             <float name='directional_threshold' value='0.02'/><float name='max_memory' value='32'/>\
+             <boolean name='direct' value='false'/><integer name='startup' value='0'/><string name='product' value='none'/>\
+             <float name='roughness_threshold' value='0'/></guide></integrator>",
+        ),
+        (
+            "<integrator type='guided_path'><string name='budgetType' value='spp'/><float name='budget' value='9'/>\
+             </integrator><sensor type='perspective'><sampler type='independent'/></sensor>",
+            "<integrator type='path'><guide name='_guide' type='sd_tree'><string name='nee' value='never'/>\
+             <string name='spatial_filter' value='nearest'/><string name='directional_filter' value='nearest'/>\
+             <string name='combination' value='last'/><float name='p_guide' value='0.5'/>\
+             <float name='spatial_threshold' value='6000'/><float name='directional_threshold' value='0.01'/>\
+             <boolean name='direct' value='false'/><integer name='startup' value='0'/><string name='product' value='none'/>\
+             <float name='roughness_threshold' value='0'/></guide></integrator>\
+             <sensor type='perspective'><sampler type='independent'><integer name='sample_count' value='9'/></sampler></sensor>",
+        ),
+    ] {
+        assert_reads("0.6.0", old, new);
+    }
+}
+
+#[test]
 fn integrators_samplers_films_sensors() {
     for (old, new) in [
         (
