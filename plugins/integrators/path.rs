@@ -23,6 +23,7 @@
 
 use super::common::{COMMON, PATH, PathLimits, timeout};
 use super::path_kernel::{Guided, Unguided, trace};
+use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{Arena, CameraRay, Guide, Integrator, Radiance, RadianceEstimator};
 use lucerna_core::render::{
     Guidance, GuidedEstimator, Notebook, RenderContext, RenderError, Report, render_estimator, render_guided,
@@ -93,6 +94,6 @@ impl GuidedEstimator for Path {
         notes: &mut Notebook,
     ) -> Radiance {
         let arena = &*arena;
-        trace(self.limits, scene, camera, stream, arena, &mut Guided { guidance, notes, arena })
+        trace(self.limits, scene, camera, stream, arena, &mut Guided { guidance, notes, arena, prospects: Rgb::WHITE })
     }
 }
