@@ -25,6 +25,7 @@
 use super::common::{COMMON, PATH, PathLimits, timeout};
 use super::lights::{ByScene, LIGHTS, Lights};
 use super::path_kernel::{Guided, Unguided, trace};
+use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{Arena, CameraRay, Guide, Integrator, Radiance, RadianceEstimator};
 use lucerna_core::render::{
     Guidance, GuidedEstimator, Notebook, RenderContext, RenderError, Report, render_estimator, render_guided,
@@ -114,7 +115,7 @@ impl GuidedEstimator for Path {
         notes: &mut Notebook,
     ) -> Radiance {
         let arena = &*arena;
-        let mut directions = Guided { guidance, notes, arena };
+        let mut directions = Guided { guidance, notes, arena, prospects: Rgb::WHITE };
         match self.lights.ready() {
             None => trace(self.limits, scene, &ByScene, camera, stream, arena, &mut directions),
             Some(lights) => trace(self.limits, scene, &lights, camera, stream, arena, &mut directions),

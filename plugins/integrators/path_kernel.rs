@@ -33,11 +33,14 @@ pub(super) trait Directions {
     /// Where the path goes on, in world space, and how.
     fn sample(here: Self::Here, hit: &SurfaceHit, bxdf: &dyn Bxdf, u1: f32, u2: Vec2) -> Option<Step>;
 
+    /// What roulette is to judge the path by, whose throughput is this.
+    fn prospects(&self, throughput: Rgb) -> Rgb;
+
     /// Notes light of a sampled emitter.
     fn note_direct(&mut self, light: Rgb);
 
     /// Notes where the path goes on.
-    fn note_step(&mut self, here: Self::Here, hit: &SurfaceHit, step: &Step);
+    fn note_step(&mut self, here: Self::Here, hit: &SurfaceHit, bxdf: &dyn Bxdf, step: &Step);
 
     /// Notes that roulette was survived.
     fn note_survival(&mut self, q: f32);
@@ -87,10 +90,15 @@ impl Directions for Unguided {
     }
 
     #[inline(always)]
+    fn prospects(&self, throughput: Rgb) -> Rgb {
+        throughput
+    }
+
+    #[inline(always)]
     fn note_direct(&mut self, _light: Rgb) {}
 
     #[inline(always)]
-    fn note_step(&mut self, (): (), _hit: &SurfaceHit, _step: &Step) {}
+    fn note_step(&mut self, (): (), _hit: &SurfaceHit, _bxdf: &dyn Bxdf, _step: &Step) {}
 
     #[inline(always)]
     fn note_survival(&mut self, _q: f32) {}
@@ -110,7 +118,12 @@ pub(super) struct Guided<'a> {
     pub notes: &'a mut Notebook,
     /// Where closed forms of what was learnt are made.
     pub arena: &'a Arena,
+    /// What the throughput would be about if directions had been chosen by the BSDF.
+    pub prospects: Rgb,
 }
+
+/// The least that is left of a path's prospects at a vertex: whatever an albedo says, roulette gives it a chance.
+const LEAST_PROSPECTS: f32 = 0.05;
 
 /// What a guide knows at a vertex.
 #[derive(Clone, Copy)]
@@ -187,6 +200,16 @@ impl<'a> Directions for Guided<'a> {
         Some(step)
     }
 
+    /// A guide takes directions from which much light comes more often than the BSDF would, and the throughput falls by as
+    /// much: judged by it, roulette would end the paths that matter (Müller 2019, section 10.6). What a path is worth, its
+    /// throughput times the light ahead, falls by the albedo only. Where the guide was wrong the throughput is larger, and
+    /// counts.
+    #[inline]
+    fn prospects(&self, throughput: Rgb) -> Rgb {
+        let Rgb { r, g, b } = self.prospects;
+        Rgb::new(throughput.r.max(r), throughput.g.max(g), throughput.b.max(b))
+    }
+
     #[inline]
     fn note_direct(&mut self, light: Rgb) {
         if self.guidance.learning {
@@ -195,7 +218,11 @@ impl<'a> Directions for Guided<'a> {
     }
 
     #[inline]
-    fn note_step(&mut self, here: Learnt<'a>, hit: &SurfaceHit, step: &Step) {
+    fn note_step(&mut self, here: Learnt<'a>, hit: &SurfaceHit, bxdf: &dyn Bxdf, step: &Step) {
+        self.prospects *= match here.guide {
+            Some(_) => at_least(bxdf.albedo(hit.wi), LEAST_PROSPECTS),
+            None => step.sample.weight,
+        };
         if !self.guidance.learning {
             return;
         }
@@ -214,6 +241,7 @@ impl<'a> Directions for Guided<'a> {
 
     #[inline]
     fn note_survival(&mut self, q: f32) {
+        self.prospects *= 1.0 / q;
         if self.guidance.learning {
             self.notes.survived(q);
         }
@@ -232,6 +260,11 @@ impl<'a> Directions for Guided<'a> {
             self.notes.end();
         }
     }
+}
+
+/// Each channel, or this if it is less; also if it is no number.
+fn at_least(color: Rgb, least: f32) -> Rgb {
+    Rgb::new(color.r.max(least), color.g.max(least), color.b.max(least))
 }
 
 /// Follows one path.
@@ -311,13 +344,13 @@ pub(super) fn trace<D: Directions>(
         let weighs = !sample.lobe.has_delta() && directions.samples_emitters();
         last = weighs.then_some(Scattered { from, pdf: sample.pdf });
         depth += 1;
-        directions.note_step(here, &hit, &step);
+        directions.note_step(here, &hit, bxdf, &step);
 
         if throughput.is_black() {
             break;
         }
         if depth >= rr_depth {
-            let q = survival(throughput, eta);
+            let q = survival(directions.prospects(throughput), eta);
             if u_roulette >= q {
                 break;
             }

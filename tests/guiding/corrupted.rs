@@ -203,7 +203,7 @@ impl GuidedDirections for Spoilt<'_> {
                     0.0
                 }
             }
-            "wrong" => 0.95 * self.inner.pdf(d),
+            "wrong" => 0.9 * self.inner.pdf(d),
             _ => self.inner.pdf(d),
         }
     }

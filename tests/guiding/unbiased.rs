@@ -79,18 +79,22 @@ fn hc_p06_corrupted_guides_are_unbiased() {
     for way in corrupted::WAYS {
         guides.push(format!("<guide type='corrupted'><string name='way' value='{way}'/></guide>"));
     }
-    for (way, p_guide) in [("random", 0.9), ("inverted", 0.7), ("one_direction", 0.5), ("one_cell", 0.0)] {
-        guides.push(format!(
+    let blind = agree(&SCENES, &guides, 9, 32);
+    // Given probabilities are not mended by learning, as those above are. What the BSDF finds then counts up to three times
+    // at every vertex, so paths are shorter.
+    let mut fixed = Vec::new();
+    for (way, p_guide) in [("random", 0.7), ("inverted", 0.7), ("one_direction", 0.5), ("one_cell", 0.0)] {
+        fixed.push(format!(
             "<guide type='corrupted'><string name='way' value='{way}'/><float name='p_guide' value='{p_guide}'/>
              <string name='nee' value='kickstart'/></guide>"
         ));
     }
-    let blind = agree(&SCENES, &guides, 9, 32);
+    let blind = blind.max(agree(&SCENES, &fixed, 4, 96));
     measured(
         "hc_p06_corrupted_guides_are_unbiased",
         format!(
             "{} corrupted guides in {} scenes agree; an error of {:.1} % of the mean would be found",
-            guides.len(),
+            guides.len() + fixed.len(),
             SCENES.len(),
             100.0 * blind
         ),
@@ -121,11 +125,11 @@ fn hc_p06_a_selection_probability_of_one_is_unbiased() {
     );
 }
 
-/// The test of the test: a guide whose density is a few percent too low makes a picture too bright.
+/// The test of the test: a guide whose density is a tenth too low makes a picture too bright.
 #[test]
 fn a_density_that_is_wrong_would_be_found() {
     let guide = "<guide type='corrupted'><string name='way' value='wrong'/><float name='p_guide' value='0.9'/></guide>";
-    let plain = pictures(SCENES[2].1, &path(9, ""), 64, 1000);
-    let guided = pictures(SCENES[2].1, &path(9, guide), 64, 2000);
+    let plain = pictures(SCENES[2].1, &path(9, ""), 192, 1000);
+    let guided = pictures(SCENES[2].1, &path(9, guide), 192, 2000);
     assert!(!compare(&guided, &plain, true, 0.01).expect("of a kind").agrees());
 }

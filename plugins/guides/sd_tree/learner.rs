@@ -13,6 +13,7 @@
 //! | descent: rate, decays, regularisation | 0.01, 0.9 and 0.999, 0.01 | the same |
 //! | light that emitter sampling finds | not learnt, or by its weight | by its weight |
 //! | weights of iterations | inverse mean variance of themselves | of the other half of the pixels |
+//! | roulette | none, or by the light ahead | by the albedo at guided vertices, or the throughput if it is larger |
 //! | iterations at the start, then | 8 of 1 sample, doubling | the same |
 
 use super::cylinder;
