@@ -15,6 +15,7 @@ pub mod check;
 mod cli;
 pub mod compare;
 mod pictures;
+mod process;
 mod short_form;
 pub mod view;
 

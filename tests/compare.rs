@@ -345,6 +345,9 @@ fn the_page_works_in_a_browser() {
     let options = options(&folder, &[4], 2);
     // Twice: the page of a scene, and one that sums up.
     let found = [0, 1].map(|_| run(&lucerna::builtin(), &folder, &["path", "direct"], &options));
+    for (number, scene) in found.iter().enumerate() {
+        page::write_pictures(scene, number, &options).expect("pictures");
+    }
     page::write(&found, &[], &options, &Facts::default()).expect("a report");
     let dump = |page: &str, size: &str| {
         let output = Command::new(browser)

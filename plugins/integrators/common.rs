@@ -3,7 +3,9 @@
 use super::lights::PickLights;
 use lucerna_core::accel::Ray;
 use lucerna_core::color::Rgb;
-use lucerna_core::interfaces::{EmitterFlags, Integrator, LightPoint, LightVertex, RadianceEstimator, SurfaceHit};
+use lucerna_core::interfaces::{
+    Bxdf, EmitterFlags, Integrator, LightPoint, LightSample, LightVertex, RadianceEstimator, SurfaceHit, Transport,
+};
 use lucerna_core::math::Vec2;
 use lucerna_core::sampling::Stream;
 use lucerna_core::scene::{EmitterId, Failed, Param, Properties, Scene};
@@ -112,9 +114,18 @@ pub fn emission(scene: &Scene, ray: &Ray, hit: Option<&SurfaceHit>) -> Option<(E
     (!radiance.is_black()).then_some((id, radiance))
 }
 
+/// Light that a ray has run into.
+#[derive(Clone, Copy)]
+pub struct Met {
+    /// Its radiance, with its weight against the sampling of lights.
+    pub light: Rgb,
+    /// The sampling of lights could not have found it.
+    pub alone: bool,
+}
+
 /// As [`emission`], weighted by `heuristic` against the sampling of lights if the path was scattered into a density
 /// before.
-#[inline]
+#[inline(always)]
 pub fn weighted_emission(
     scene: &Scene,
     lights: &impl PickLights,
@@ -122,18 +133,28 @@ pub fn weighted_emission(
     hit: Option<&SurfaceHit>,
     last: Option<Scattered>,
     heuristic: impl Fn(f32, f32) -> f32,
-) -> Rgb {
-    let Some((id, radiance)) = emission(scene, ray, hit) else { return Rgb::BLACK };
-    match last {
-        None => radiance,
-        Some(last) => {
-            let point = match hit {
-                Some(hit) => LightPoint::of_hit(last.from.p, hit, ray.d),
-                None => LightPoint::of_environment(ray.d),
-            };
-            radiance * heuristic(last.pdf, lights.pdf(scene, id, &last.from, &point))
-        }
+) -> Option<Met> {
+    let (id, radiance) = emission(scene, ray, hit)?;
+    let Some(last) = last else { return Some(Met { light: radiance, alone: true }) };
+    let point = match hit {
+        Some(hit) => LightPoint::of_hit(last.from.p, hit, ray.d),
+        None => LightPoint::of_environment(ray.d),
+    };
+    let pdf = lights.pdf(scene, id, &last.from, &point);
+    Some(Met { light: radiance * heuristic(last.pdf, pdf), alone: pdf == 0.0 })
+}
+
+/// What a hit would scatter of a light sample if nothing stood between, unweighted, and the density of sampling its
+/// direction from the BSDF.
+#[inline(always)]
+pub fn scattered(scene: &Scene, hit: &SurfaceHit, bxdf: &dyn Bxdf, light: &LightSample) -> (Rgb, f32) {
+    let wo = hit.to_local(light.point.d);
+    let (value, pdf) = bxdf.eval_pdf(hit.wi, wo, Transport::Radiance);
+    let contribution = value * light.weight;
+    if contribution.is_black() || !scene.keeps_sides(hit, wo) {
+        return (Rgb::BLACK, pdf);
     }
+    (contribution, pdf)
 }
 
 /// The first hit, or where lights are `hidden` the first that gives off none, written in place. Whether there is any.

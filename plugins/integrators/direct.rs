@@ -19,7 +19,7 @@
 //! ```
 
 use super::common::{
-    COMMON, HIDE, emission, find_surface, forward_integrator, mis_weight, pair_before_single, timeout,
+    COMMON, HIDE, emission, find_surface, forward_integrator, mis_weight, pair_before_single, scattered, timeout,
 };
 use super::lights::{ByScene, LIGHTS, Lights, PickLights};
 use lucerna_core::color::Rgb;
@@ -130,12 +130,7 @@ impl Direct {
         let lobes = bsdf.lobes();
         let from = lights.vertex(&hit, lobes);
         let unblocked = |light: &LightSample| {
-            let wo = hit.to_local(light.point.d);
-            let (value, pdf) = bxdf.eval_pdf(hit.wi, wo, Transport::Radiance);
-            let contribution = value * light.weight;
-            if contribution.is_black() || !scene.keeps_sides(&hit, wo) {
-                return Rgb::BLACK;
-            }
+            let (contribution, pdf) = scattered(scene, &hit, bxdf, light);
             let weight = if light.delta { 1.0 } else { mis_weight(light.pdf * emitter_count, pdf * bsdf_count) };
             contribution * (weight / emitter_count)
         };

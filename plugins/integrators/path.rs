@@ -14,7 +14,7 @@
 //! | `rr_depth` | integer | 5 | depth from which Russian roulette may end a path, at least 1 |
 //! | `hide_emitters` | boolean | false | lights are not seen directly; the light they give is unchanged |
 //! | nested `light_sampler` | | by the scene's weights | which light a vertex samples |
-//! | (nested) | guide | unset | learns where light comes from, as `sd_tree` |
+//! | nested `guide` | | none | learns where light comes from, as `sd_tree` |
 //!
 //! ```xml
 //! <integrator type="path">

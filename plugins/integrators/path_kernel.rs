@@ -3,13 +3,12 @@
 //! The kernel is compiled once for each way to decide ([`Directions`]); where nothing is learnt it is what it would be
 //! without any of this.
 
-use super::common::{PathLimits, Scattered, emission, find_surface, mis_weight, survival};
+use super::common::{Met, PathLimits, Scattered, find_surface, mis_weight, scattered, survival, weighted_emission};
 use super::lights::PickLights;
-use lucerna_core::accel::Ray;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{
-    Arena, Bxdf, BxdfSample, CameraRay, GuidedDirections, LightPoint, LightSample, Lobes, MOST_GUIDED, Radiance,
-    RecordKind, SurfaceHit, Transport,
+    Arena, Bxdf, BxdfSample, CameraRay, GuidedDirections, LightSample, Lobes, MOST_GUIDED, Radiance, RecordKind,
+    SurfaceHit, Transport,
 };
 use lucerna_core::math::{ONE_MINUS_EPSILON, Vec2, Vec3};
 use lucerna_core::render::{Guidance, Notebook, Scattering};
@@ -295,8 +294,11 @@ pub(super) fn trace<D: Directions>(
     loop {
         let hidden = hide_emitters && depth == 0;
         let met = find_surface(scene, &ray, hidden, &mut hit, &mut found.rays);
-        if !hidden {
-            let light = met_emission(scene, lights, &ray, met.then_some(&hit), last, directions);
+        if !hidden
+            && let Some(Met { light, alone }) =
+                weighted_emission(scene, lights, &ray, met.then_some(&hit), last, mis_weight)
+        {
+            directions.note_met(light, alone);
             found.rgb += throughput * light;
         }
         if !met {
@@ -365,31 +367,6 @@ pub(super) fn trace<D: Directions>(
     found
 }
 
-/// Light that a ray has run into, weighted against emitter sampling if the path was scattered into a density before.
-#[inline(always)]
-fn met_emission<D: Directions>(
-    scene: &Scene,
-    lights: &impl PickLights,
-    ray: &Ray,
-    hit: Option<&SurfaceHit>,
-    last: Option<Scattered>,
-    directions: &mut D,
-) -> Rgb {
-    let Some((id, radiance)) = emission(scene, ray, hit) else { return Rgb::BLACK };
-    let Some(last) = last else {
-        directions.note_met(radiance, true);
-        return radiance;
-    };
-    let point = match hit {
-        Some(hit) => LightPoint::of_hit(last.from.p, hit, ray.d),
-        None => LightPoint::of_environment(ray.d),
-    };
-    let pdf = lights.pdf(scene, id, &last.from, &point);
-    let light = radiance * mis_weight(last.pdf, pdf);
-    directions.note_met(light, pdf == 0.0);
-    light
-}
-
 /// Light of one emitter sample scattered at a hit, weighted against the sampling of directions.
 #[inline(always)]
 fn direct_light<D: Directions>(
@@ -409,18 +386,6 @@ fn direct_light<D: Directions>(
         return Rgb::BLACK;
     }
     contribution * weight_of::<D>(light, here, pdf)
-}
-
-/// The same without the weight and as if nothing stood between, and the density of BSDF sampling.
-#[inline(always)]
-fn scattered(scene: &Scene, hit: &SurfaceHit, bxdf: &dyn Bxdf, light: &LightSample) -> (Rgb, f32) {
-    let wo = hit.to_local(light.point.d);
-    let (value, pdf) = bxdf.eval_pdf(hit.wi, wo, Transport::Radiance);
-    let contribution = value * light.weight;
-    if contribution.is_black() || !scene.keeps_sides(hit, wo) {
-        return (Rgb::BLACK, pdf);
-    }
-    (contribution, pdf)
 }
 
 /// Weight of emitter sampling against the sampling of directions, in which the BSDF has density `pdf`.

@@ -19,8 +19,8 @@
 //! ```
 
 use super::common::{
-    COMMON, PATH, PathLimits, Scattered, balance_weight, find_surface, forward_integrator, mis_weight,
-    pair_before_single, survival, timeout, weighted_emission,
+    COMMON, Met, PATH, PathLimits, Scattered, balance_weight, find_surface, forward_integrator, mis_weight,
+    pair_before_single, scattered, survival, timeout, weighted_emission,
 };
 use super::lights::{ByScene, LIGHTS, Lights, PickLights};
 use lucerna_core::accel::Ray;
@@ -145,11 +145,12 @@ impl VolPath {
             }
             let hidden = hide_emitters && depth == 0;
             let met = find_surface(scene, &ray, hidden, &mut hit, &mut found.rays);
-            if !hidden {
-                found.rgb += throughput
-                    * weighted_emission(scene, lights, &ray, met.then_some(&hit), last, |a, b| {
-                        self.variant.weight(a, b)
-                    });
+            let weight = |a, b| self.variant.weight(a, b);
+            if !hidden
+                && let Some(Met { light, .. }) =
+                    weighted_emission(scene, lights, &ray, met.then_some(&hit), last, weight)
+            {
+                found.rgb += throughput * light;
             }
             if !met {
                 break;
@@ -159,11 +160,9 @@ impl VolPath {
             let lobes = bsdf.lobes();
             let from = lights.vertex(&hit, lobes);
             let unblocked = |light: &LightSample| {
-                let wo = hit.to_local(light.point.d);
-                let (value, pdf) = bxdf.eval_pdf(hit.wi, wo, Transport::Radiance);
-                let contribution = value * light.weight;
-                let counts = !contribution.is_black() && scene.keeps_sides(&hit, wo);
-                counts.then(|| (contribution, if light.delta { 1.0 } else { self.variant.weight(light.pdf, pdf) }))
+                let (contribution, pdf) = scattered(scene, &hit, bxdf, light);
+                (!contribution.is_black())
+                    .then(|| (contribution, if light.delta { 1.0 } else { self.variant.weight(light.pdf, pdf) }))
             };
             let worth =
                 |light: &LightSample| unblocked(light).map_or(0.0, |(value, weight)| (value * weight).luminance());

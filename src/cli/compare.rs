@@ -192,6 +192,7 @@ pub fn run(registry: &Registry, arguments: &Arguments) -> Result<ExitCode, Failu
         match compare(registry, scene, &methods, &options, &mut tell) {
             Ok(result) => {
                 print(&result, &options);
+                page::write_pictures(&result, done.len(), &options).map_err(Failure::new)?;
                 done.push(result);
             }
             Err(why) => {

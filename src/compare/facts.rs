@@ -3,8 +3,10 @@
 use super::method::Methods;
 use super::subject::program;
 use crate::check::reference;
+use crate::process::line_of;
 use serde_json::{Value, json};
 use std::path::Path;
+use std::sync::OnceLock;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 /// The facts.
@@ -27,7 +29,7 @@ impl Facts {
                 format!("Lucerna {}, build {}", env!("CARGO_PKG_VERSION"), &program()[..12.min(program().len())]),
             ),
             ("started", utc(SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs()))),
-            ("processor", processor()),
+            ("processor", processor().to_owned()),
             ("processors", std::thread::available_parallelism().map_or_else(|_| "?".to_owned(), |n| n.to_string())),
             ("threads", rayon::current_num_threads().to_string()),
         ];
@@ -57,15 +59,12 @@ impl Facts {
 }
 
 /// The processor, as the system calls it.
-pub fn processor() -> String {
-    let line = line_of("/proc/cpuinfo", "model name");
-    line.map_or_else(|| std::env::consts::ARCH.to_owned(), |name| name.trim_start_matches(':').trim().to_owned())
-}
-
-/// What follows a word at the start of a line of a file.
-fn line_of(file: &str, word: &str) -> Option<String> {
-    let text = std::fs::read_to_string(file).ok()?;
-    text.lines().find_map(|line| Some(line.strip_prefix(word)?.trim().to_owned()))
+pub fn processor() -> &'static str {
+    static NAME: OnceLock<String> = OnceLock::new();
+    NAME.get_or_init(|| {
+        let line = line_of("/proc/cpuinfo", "model name");
+        line.map_or_else(|| std::env::consts::ARCH.to_owned(), |name| name.trim_start_matches(':').trim().to_owned())
+    })
 }
 
 /// Date and time of seconds since 1970, with the calendar's cycle of 146 097 days (400 years).

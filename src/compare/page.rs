@@ -29,7 +29,30 @@ const VIEWER: [(&str, &str); 4] = [
     ("viewer.js", include_str!("page/viewer.js")),
 ];
 
-/// Writes the report.
+/// Writes the pictures of a scene, the one with this number in the report.
+///
+/// # Errors
+/// If a file cannot be written.
+pub fn write_pictures(scene: &SceneResult, number: usize, options: &Options) -> Result<(), String> {
+    let maps = std::iter::once(&[][..]).chain(working(scene).map(|(_, method)| method.flip_map.as_slice()));
+    for (image, ((_, values), map)) in pictures(scene).into_iter().zip(maps).enumerate() {
+        let name = format!("{number}-{image}");
+        let (values, map) = (floats(&three(scene, values)), floats(map));
+        let text = format!("LUCERNA_PICTURE(\"{name}\", \"{values}\", \"{map}\");\n");
+        put(options, &format!("data/{name}.js"), &text)?;
+    }
+    Ok(())
+}
+
+/// Writes a file of the report.
+fn put(options: &Options, name: &str, text: &str) -> Result<(), String> {
+    let path = options.output.join(name);
+    let folder = path.parent().unwrap_or(&options.output);
+    std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    std::fs::write(&path, text).map_err(|e| format!("{}: {e}", path.display()))
+}
+
+/// Writes the report, but for [the pictures](write_pictures).
 ///
 /// # Errors
 /// If a file cannot be written.
@@ -39,12 +62,7 @@ pub fn write(
     options: &Options,
     facts: &Facts,
 ) -> Result<(), String> {
-    let put = |name: &str, text: &str| {
-        let path = options.output.join(name);
-        std::fs::write(&path, text).map_err(|e| format!("{}: {e}", path.display()))
-    };
-    let data = options.output.join("data");
-    std::fs::create_dir_all(&data).map_err(|e| format!("{}: {e}", data.display()))?;
+    let put = |name: &str, text: &str| put(options, name, text);
     put("results.json", &format!("{:#}\n", to_json(scenes, failed, options, facts)))?;
     put("results.csv", &to_csv(scenes, options))?;
     put("results.tex", &to_latex(scenes, options))?;
@@ -53,19 +71,12 @@ pub fn write(
         put(name, text)?;
     }
     let mut list = Vec::new();
-    for (number, scene) in scenes.iter().enumerate() {
-        let shown: Vec<(&str, &[f32])> = pictures(scene);
-        let maps = std::iter::once(&[][..]).chain(working(scene).map(|(_, method)| method.flip_map.as_slice()));
-        for (image, ((_, values), map)) in shown.iter().zip(maps).enumerate() {
-            let name = format!("{number}-{image}");
-            let (values, map) = (floats(&three(scene, values)), floats(map));
-            put(&format!("data/{name}.js"), &format!("LUCERNA_PICTURE(\"{name}\", \"{values}\", \"{map}\");\n"))?;
-        }
+    for scene in scenes {
         list.push(json!({
             "name": scene.scene.display().to_string(),
             "size": scene.truth.size,
             "exposure": exposure(&picture(scene, &scene.truth.values)),
-            "images": shown.iter().map(|(name, _)| name).collect::<Vec<_>>(),
+            "images": pictures(scene).iter().map(|(name, _)| *name).collect::<Vec<_>>(),
             "places": crops::places(scene),
         }));
     }
@@ -283,7 +294,10 @@ fn lead(scene: &SceneResult, options: &Options) -> String {
             let sure = if gain.excludes(1.0) { "" } else { ", which may be chance" };
             format!("{} is {} as efficient as {} by relMSE{sure}.", bold(i), times(&gain), bold(scene.baseline))
         }
-        Some(_) => format!("{} is the most efficient by relMSE.", bold(scene.baseline)),
+        Some(_) if unbiased(&scene.baseline) => {
+            format!("{} is the most efficient by relMSE.", bold(scene.baseline))
+        }
+        Some(_) => format!("None is more efficient than {} by relMSE.", bold(scene.baseline)),
         None => String::new(),
     };
     let biased: Vec<String> = (0..scene.methods.len()).filter(|i| !unbiased(i)).map(bold).collect();
@@ -323,7 +337,7 @@ fn legend(scene: &SceneResult) -> String {
 }
 
 fn plot(scene: &SceneResult, label: &str, x: &str, along: impl Fn(&Point) -> f64) -> String {
-    let floor = scene.truth.noise.map(|n| (n[1], "noise of the reference"));
+    let floor = scene.truth.noise.map(|n| (n[1], "noise of the reference")).filter(|(noise, _)| *noise > 0.0);
     let curves = working(scene).map(|(number, method)| {
         let dots = method.points.iter().map(|point| {
             let error = point.mean(|e| e.rel_mse);

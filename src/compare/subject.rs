@@ -1,11 +1,11 @@
 //! A scene as one method renders it.
 
 use super::method::Method;
-use super::turn::processor_seconds;
 use super::{Options, Shot};
 use crate::check::key::{digest, scene_hash};
 use crate::check::reference;
 use crate::pictures::{Source, one_line, read};
+use crate::process::processor_seconds;
 #[cfg(doc)]
 use lucerna_core::interfaces::Sampler;
 use lucerna_core::render::{Budget, Control, FilmStore, PassEnd, RenderContext};

@@ -115,9 +115,10 @@ pub fn make(
             let truth = kept.truth(&method);
             let mses = pictures.iter().filter_map(|p| errors(p, &truth.values, truth.channels.len()).ok());
             let best = mses.map(|e| e.mse).fold(f64::INFINITY, f64::min);
-            let reached = truth.is_good_for(best) && kept.seeds.count() >= FEWEST_PASSES;
-            if reached || (spent >= options.reference_seconds && kept.seeds.count() >= 2) {
-                return Ok(Truth { reached: Some(reached), ..truth });
+            // Where no picture can be measured there is nothing it has to be good for.
+            let reached = best.is_finite().then(|| truth.is_good_for(best) && kept.seeds.count() >= FEWEST_PASSES);
+            if reached.unwrap_or(kept.seeds.count() >= FEWEST_PASSES) || spent >= options.reference_seconds {
+                return Ok(Truth { reached, ..truth });
             }
         }
         let mut running = match kept.take() {

@@ -5,6 +5,7 @@
 use super::method::Methods;
 use super::subject::{Subject, joined};
 use super::{Options, Shot};
+use crate::process::peak_memory;
 use lucerna_core::image::Image;
 use lucerna_core::scene::Registry;
 use serde::{Deserialize, Serialize};
@@ -214,25 +215,6 @@ fn send(output: &mut impl Write, shot: &Shot) -> std::io::Result<()> {
     output.write_all(&bytes)
 }
 
-/// The most memory that this process has had at a time, in MiB, if the system tells (Linux).
-fn peak_memory() -> Option<f64> {
-    let text = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
-    let kib: f64 = line.split_whitespace().next()?.parse().ok()?;
-    Some(kib / 1024.0)
-}
-
-/// Seconds that the processors have spent on this process, to the nanosecond, if the system tells (Linux).
-pub fn processor_seconds() -> Option<f64> {
-    let mut nanoseconds = 0_u64;
-    for task in std::fs::read_dir("/proc/self/task").ok()? {
-        // A thread may end meanwhile.
-        let Ok(text) = std::fs::read_to_string(task.ok()?.path().join("schedstat")) else { continue };
-        nanoseconds += text.split_whitespace().next()?.parse::<u64>().ok()?;
-    }
-    (nanoseconds > 0).then_some(nanoseconds as f64 * 1e-9)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -258,17 +240,5 @@ mod tests {
         assert!(shots[0].image.data[0] == 0.5 && shots[0].image.data[1].is_nan());
         assert!(matches!(read(&b"{\"error\": \"why\"}\n"[..]), Err(Some(why)) if why == "why"));
         assert!(matches!(read(&b"nonsense"[..]), Err(None)));
-    }
-
-    #[test]
-    fn work_takes_processor_time() {
-        let Some(before) = processor_seconds() else { return };
-        let began = std::time::Instant::now();
-        let mut sum = 0.0_f64;
-        while began.elapsed().as_millis() < 30 {
-            sum += (0..1000).map(|i| f64::from(i).sqrt()).sum::<f64>();
-        }
-        assert!(processor_seconds().unwrap() > before && sum > 0.0);
-        assert!(peak_memory().unwrap() > 1.0);
     }
 }

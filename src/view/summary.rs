@@ -1,6 +1,7 @@
 //! What is told of a render when it is over.
 
 use super::Point;
+use crate::process::peak_memory;
 use lucerna_core::math::UVec2;
 use lucerna_core::render::Report;
 use serde_json::{Value, json};
@@ -29,7 +30,7 @@ impl Summary {
         let [rate, ray_rate] = rates(report);
         let stopped = if self.is_stopped(report) { ", stopped early" } else { "" };
         let estimate = self.estimate.map_or_else(String::new, |estimate| format!(", estimated relMSE {estimate:.2e}"));
-        let memory = peak_memory().map_or_else(String::new, |mib| format!(", {mib} MiB"));
+        let memory = peak_mib().map_or_else(String::new, |mib| format!(", {mib} MiB"));
         format!(
             "{} x {} pixels, {} spp{stopped}{estimate}, {:.2} s, {rate:.2} Msamples/s, {ray_rate:.2} Mrays/s{memory}",
             size.x, size.y, report.spp, report.seconds
@@ -59,7 +60,7 @@ impl Summary {
             "mrays_per_second": ray_rate,
             "bad_samples": report.bad.count,
             "stopped": self.is_stopped(report),
-            "peak_memory_mib": peak_memory(),
+            "peak_memory_mib": peak_mib(),
         });
         if let Some(estimate) = self.estimate {
             document["estimated_rel_mse"] = json!(estimate);
@@ -106,9 +107,7 @@ pub fn tell_bad_samples(report: &Report, seed: u32) {
     }
 }
 
-/// Largest resident size of the process so far in MiB, where the system tells.
-fn peak_memory() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
-    line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib >> 10)
+/// In whole MiB.
+fn peak_mib() -> Option<u64> {
+    peak_memory().map(|mib| mib as u64)
 }

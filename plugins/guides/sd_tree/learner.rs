@@ -27,7 +27,7 @@ use lucerna_core::math::Aabb;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Nodes above the limit of memory: the threshold of quadtrees is doubled so often at most.
+/// Above the limit of memory the threshold of quadtrees is doubled, so often at most.
 const MOST_COARSENINGS: u32 = 10;
 
 /// The tree that is filled.
@@ -38,8 +38,6 @@ pub struct Learner {
     field: Arc<Field>,
     /// Records taken in, over all iterations: what their random numbers depend on.
     taken: u64,
-    /// Records of this iteration.
-    records: u64,
     iterations: u32,
     /// The limit of memory was reached.
     full: bool,
@@ -71,7 +69,7 @@ impl Learner {
         let tree = SpatialTree::new(bounds);
         let field = Arc::new(Field { tree: tree.clone(), leaves: vec![Leaf::default()], cosine: settings.cosine });
         let cells = vec![Cell::default()];
-        Learner { settings, tree, cells, field, taken: 0, records: 0, iterations: 0, full: false }
+        Learner { settings, tree, cells, field, taken: 0, iterations: 0, full: false }
     }
 
     /// Where the record goes, with the part of it in each cell.
@@ -203,9 +201,7 @@ impl GuideLearner for Learner {
                 }
             }
         });
-        let count = tiles.iter().map(|tile| tile.len() as u64).sum::<u64>();
-        self.taken += count;
-        self.records += count;
+        self.taken += tiles.iter().map(|tile| tile.len() as u64).sum::<u64>();
     }
 
     fn refine(&mut self, spp: u32) {
@@ -226,7 +222,6 @@ impl GuideLearner for Learner {
         };
         let leaves = self.cells.iter().map(leaf).collect();
         self.field = Arc::new(Field { tree: self.tree.clone(), leaves, cosine: self.settings.cosine });
-        self.records = 0;
         self.iterations += 1;
     }
 

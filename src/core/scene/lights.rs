@@ -18,7 +18,7 @@ impl Scene {
 
     /// Samples a light that was chosen with chance `pmf`, which becomes part of density and weight. Visibility is not
     /// tested.
-    #[inline]
+    #[inline(always)]
     pub fn sample_light(&self, light: Light, pmf: f32, from: Vec3, u2: Vec2) -> Option<LightSample> {
         let emitter = self.emitter(light.emitter);
         let mut sample = match light.part {

@@ -2,7 +2,7 @@
 
 use super::object::{BuiltSensor, BuiltShape};
 use crate::accel::{Accel, BuildOptions, Geometry, Hit, NO_INSTANCE, NO_TRIANGLE, Ray};
-use crate::interfaces::{Bsdf, Emitter, EmitterFlags, Integrator, LightPoint, LightSample, SurfaceHit};
+use crate::interfaces::{Bsdf, Emitter, EmitterFlags, Integrator, Light, LightPoint, LightSample, SurfaceHit};
 use crate::math::{ONE_MINUS_EPSILON, Transform, Vec2, Vec3};
 use crate::sampling::Discrete;
 use std::sync::Arc;
@@ -324,12 +324,7 @@ impl Scene {
     pub fn sample_emitter(&self, from: Vec3, mut u2: Vec2) -> Option<(EmitterId, LightSample)> {
         let (id, pmf, rest) = self.choose_emitter(u2.x)?;
         u2.x = rest;
-        let mut sample = self.emitter(id).sample_direct(from, u2)?;
-        sample.pdf *= pmf;
-        sample.weight = sample.weight / pmf;
-        let triangle = &mut sample.point.triangle;
-        *triangle = triangle.saturating_add(self.first_triangles[id.0 as usize]);
-        Some((id, sample))
+        Some((id, self.sample_light(Light::whole(id), pmf, from, u2)?))
     }
 
     /// Density with which [`sample_emitter`](Self::sample_emitter) gives this point of this emitter.
