@@ -98,12 +98,6 @@ impl Microfacets {
         Microfacets { shape, alpha_u: alpha_u.max(1e-4), alpha_v: alpha_v.max(1e-4), sample_visible }
     }
 
-    /// Which distribution.
-    #[inline]
-    pub fn shape(&self) -> Shape {
-        self.shape
-    }
-
     /// Whether only visible normals are sampled.
     #[inline]
     pub fn samples_visible(&self) -> bool {
@@ -173,20 +167,21 @@ impl Microfacets {
     }
 
     fn sample_seen(&self, wi: Vec3, u: Vec2) -> (Vec3, f32) {
+        let seen = self.seen_from(wi);
+        let slope = match self.shape {
+            Shape::Beckmann => Vec2::new(seen.beckmann_along(u.x), beckmann_across(u.y)),
+            Shape::Ggx => seen.ggx(warp::square_to_disk_concentric(u)),
+        };
+        let m = seen.normal(slope);
+        (m, self.eval(m) * self.smith_g1(wi, m) * wi.dot(m).abs() / wi.z)
+    }
+
+    /// The facets that are visible from a direction; `wi.z` must be positive.
+    #[inline]
+    pub fn seen_from(&self, wi: Vec3) -> Seen {
         // Stretch until the roughness is 1, take a slope there, turn and shrink it back.
         let stretched = Vec3::new(self.alpha_u * wi.x, self.alpha_v * wi.y, wi.z).normalize();
-        let (sin_phi, cos_phi) = azimuth(stretched);
-        let slope = match self.shape {
-            Shape::Beckmann => beckmann_slope(stretched.z, u),
-            Shape::Ggx => ggx_slope(stretched.z, u),
-        };
-        let m = Vec3::new(
-            -(cos_phi * slope.x - sin_phi * slope.y) * self.alpha_u,
-            -(sin_phi * slope.x + cos_phi * slope.y) * self.alpha_v,
-            1.0,
-        )
-        .normalize();
-        (m, self.eval(m) * self.smith_g1(wi, m) * wi.dot(m).abs() / wi.z)
+        Seen { cos_theta: stretched.z, azimuth: azimuth(stretched), alpha: [self.alpha_u, self.alpha_v] }
     }
 
     /// Part of the facets of normal `m` that are seen from both directions.
@@ -227,36 +222,71 @@ fn azimuth(v: Vec3) -> (f32, f32) {
     ((v.y * inv).clamp(-1.0, 1.0), (v.x * inv).clamp(-1.0, 1.0))
 }
 
-/// A visible slope of the Beckmann distribution of roughness 1. The cumulative distribution is inverted by at most three
-/// Newton steps in the domain of erf, which keeps the map from `u` continuous; after a small one, the next is nothing.
-fn beckmann_slope(cos_theta_i: f32, u: Vec2) -> Vec2 {
-    let tan = safe_sqrt(1.0 - cos_theta_i * cos_theta_i) / cos_theta_i;
-    let cot = 1.0 / tan;
-    let max = erf(cot);
-    let u = u.min(Vec2::splat(1.0 - 1e-6)).max(Vec2::splat(1e-6));
-    // The exact solution at grazing incidence, where the distribution is least linear.
-    let mut x = max - (max + 1.0) * erf((-u.x.ln()).sqrt());
-    let target = u.x * (1.0 + max + FRAC_1_SQRT_PI * tan * (-cot * cot).exp());
-    for _ in 0..3 {
-        let slope = erfinv(x);
-        let value = 1.0 + x + FRAC_1_SQRT_PI * tan * (-slope * slope).exp() - target;
-        let step = value / (1.0 - slope * tan);
-        x -= step;
-        if step.abs() < 1e-4 {
-            break;
-        }
-    }
-    Vec2::new(erfinv(x), erfinv(2.0 * u.y - 1.0))
+/// Facets that are visible from one direction. Slopes are those of a surface stretched to a roughness of 1, along the
+/// direction and across.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    /// Of the stretched direction.
+    cos_theta: f32,
+    /// Sine and cosine of its azimuth.
+    azimuth: (f32, f32),
+    alpha: [f32; 2],
 }
 
-/// A visible slope of the GGX distribution of roughness 1.
-fn ggx_slope(cos_theta_i: f32, u: Vec2) -> Vec2 {
-    let mut p = warp::square_to_disk_concentric(u);
-    p.y = lerp(safe_sqrt(1.0 - p.x * p.x), p.y, 0.5 * (1.0 + cos_theta_i));
-    let z = safe_sqrt(1.0 - p.length_squared());
-    let sin_theta_i = safe_sqrt(1.0 - cos_theta_i * cos_theta_i);
-    let norm = 1.0 / (sin_theta_i * p.y + cos_theta_i * z);
-    Vec2::new(cos_theta_i * p.y - sin_theta_i * z, p.x) * norm
+impl Seen {
+    /// The facet of a slope.
+    #[inline]
+    pub fn normal(&self, slope: Vec2) -> Vec3 {
+        let ((sin_phi, cos_phi), [alpha_u, alpha_v]) = (self.azimuth, self.alpha);
+        let x = -(cos_phi * slope.x - sin_phi * slope.y) * alpha_u;
+        let y = -(sin_phi * slope.x + cos_phi * slope.y) * alpha_v;
+        Vec3::new(x, y, 1.0).normalize()
+    }
+
+    /// The slope of the Beckmann distribution along the direction, for a number in [0, 1). The cumulative distribution is
+    /// inverted by at most three Newton steps in the domain of erf, which keeps the map continuous; after a small one,
+    /// the next is nothing.
+    pub fn beckmann_along(&self, u: f32) -> f32 {
+        let tan = safe_sqrt(1.0 - self.cos_theta * self.cos_theta) / self.cos_theta;
+        let cot = 1.0 / tan;
+        let max = erf(cot);
+        let u = inside(u);
+        // The exact solution at grazing incidence, where the distribution is least linear.
+        let mut x = max - (max + 1.0) * erf((-u.ln()).sqrt());
+        let target = u * (1.0 + max + FRAC_1_SQRT_PI * tan * (-cot * cot).exp());
+        for _ in 0..3 {
+            let slope = erfinv(x);
+            let value = 1.0 + x + FRAC_1_SQRT_PI * tan * (-slope * slope).exp() - target;
+            let step = value / (1.0 - slope * tan);
+            x -= step;
+            if step.abs() < 1e-4 {
+                break;
+            }
+        }
+        erfinv(x)
+    }
+
+    /// The slope of the GGX distribution, for a point of the unit disk (see [`warp::square_to_disk_concentric`]).
+    #[inline]
+    pub fn ggx(&self, mut p: Vec2) -> Vec2 {
+        p.y = lerp(safe_sqrt(1.0 - p.x * p.x), p.y, 0.5 * (1.0 + self.cos_theta));
+        let z = safe_sqrt(1.0 - p.length_squared());
+        let sin_theta = safe_sqrt(1.0 - self.cos_theta * self.cos_theta);
+        let norm = 1.0 / (sin_theta * p.y + self.cos_theta * z);
+        Vec2::new(self.cos_theta * p.y - sin_theta * z, p.x) * norm
+    }
+}
+
+/// The slope of the Beckmann distribution across the direction, wherever that is, for a number in [0, 1).
+#[inline]
+pub fn beckmann_across(u: f32) -> f32 {
+    erfinv(2.0 * inside(u) - 1.0)
+}
+
+/// Kept off the ends, where slopes are infinite.
+#[inline]
+fn inside(u: f32) -> f32 {
+    u.min(1.0 - 1e-6).max(1e-6)
 }
 
 #[cfg(test)]

@@ -1,8 +1,9 @@
 //! How much light passes a rough dielectric interface, integrated at load.
 
 use super::fresnel::{dielectric, reflect_at, refract_at};
-use super::microfacet::{Microfacets, Shape};
+use super::microfacet::{Microfacets, Shape, beckmann_across};
 use lucerna_core::math::{Vec2, Vec3, lerp};
+use lucerna_core::sampling::warp;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
@@ -53,13 +54,13 @@ impl RoughInterface {
         };
 
         let mut transmittance = [0.0; RESOLUTION];
-        let nodes = Quadrature::for_index(eta);
+        let nodes = Quadrature::for_index(eta, shape);
         transmittance
             .par_iter_mut()
             .enumerate()
             .for_each(|(i, t)| *t = nodes.mean_over_facets(&facets, direction(i), transmitted));
 
-        let nodes = Quadrature::for_index(1.0 / eta);
+        let nodes = Quadrature::for_index(1.0 / eta, shape);
         let inside: Vec<f32> = (0..RESOLUTION)
             .into_par_iter()
             .map(|i| nodes.mean_over_facets(&facets, direction(i), reflected) * direction(i).z)
@@ -76,55 +77,91 @@ impl RoughInterface {
     }
 }
 
-/// Gauss–Legendre nodes and weights over [0, 1].
-struct Quadrature(Vec<(f64, f64)>);
+/// Integrates over facets.
+struct Quadrature {
+    /// Gauss–Legendre nodes and weights over [0, 1].
+    nodes: Vec<(f64, f64)>,
+    /// What samples of facets have in common for all directions, at nodes of the first half (rows) and at all.
+    common: Common,
+}
+
+/// See [`Quadrature`].
+enum Common {
+    /// Slopes across the direction, of the first half of the nodes.
+    Beckmann(Vec<f32>),
+    /// Points of the unit disk, row after row.
+    Ggx(Vec<Vec2>),
+}
 
 impl Quadrature {
     /// Total reflection puts a kink into the integrand, which needs more nodes.
-    fn for_index(eta: f32) -> Self {
-        Self::new(if eta > 1.0 { 32 } else { 128 })
+    fn for_index(eta: f32, shape: Shape) -> Self {
+        Self::new(if eta > 1.0 { 32 } else { 128 }, shape)
     }
 
-    /// The roots of the Legendre polynomial of degree `n` by Newton's method.
-    fn new(n: usize) -> Self {
-        let node = |i: usize| {
-            let mut x = -((i as f64 + 0.75) / (n as f64 + 0.5) * std::f64::consts::PI).cos();
-            let mut slope = 1.0;
-            for _ in 0..20 {
-                let (mut p, mut previous) = (x, 1.0);
-                for k in 2..=n {
-                    let k = k as f64;
-                    (p, previous) = (((2.0 * k - 1.0) * x * p - (k - 1.0) * previous) / k, p);
-                }
-                slope = n as f64 * (x * p - previous) / (x * x - 1.0);
-                let step = p / slope;
-                x -= step;
-                if step.abs() < 1e-15 {
-                    break;
-                }
+    fn new(n: usize, shape: Shape) -> Self {
+        let nodes = gauss_legendre(n);
+        let number = |i: usize| nodes[i].0 as f32;
+        let common = match shape {
+            Shape::Beckmann => Common::Beckmann((0..n / 2).map(|i| beckmann_across(number(i))).collect()),
+            Shape::Ggx => {
+                let point = |i| warp::square_to_disk_concentric(Vec2::new(number(i / n), number(i % n)));
+                Common::Ggx((0..n / 2 * n).map(point).collect())
             }
-            (0.5 + 0.5 * x, 1.0 / ((1.0 - x * x) * slope * slope))
         };
-        Quadrature((0..n).map(node).collect())
+        Quadrature { nodes, common }
     }
 
     /// Mean over the facets visible from `wi`, in the plane y = 0, of an `f` that is the same for both of two facets
     /// which mirror each other there.
     fn mean_over_facets(&self, facets: &Microfacets, wi: Vec3, f: impl Fn(Vec3, Vec3) -> f32) -> f32 {
-        // One of both numbers chooses between mirrored facets, x < 1/2 or not: half of its nodes will do.
-        let half = &self.0[..self.0.len() / 2];
-        let mut sum = 0.0;
-        for (x, wx) in half {
-            for (y, wy) in &self.0 {
-                let u = match facets.shape() {
-                    Shape::Beckmann => Vec2::new(*y as f32, *x as f32),
-                    Shape::Ggx => Vec2::new(*x as f32, *y as f32),
-                };
-                sum += f64::from(f(wi, facets.sample(wi, u).0)) * wx * wy;
+        let seen = facets.seen_from(wi);
+        let number = |j: &(f64, f64)| j.0 as f32;
+        2.0 * match &self.common {
+            Common::Beckmann(across) => {
+                let along: Vec<f32> = self.nodes.iter().map(|j| seen.beckmann_along(number(j))).collect();
+                self.mean_over_slopes(|i, j| f(wi, seen.normal(Vec2::new(along[j], across[i]))))
+            }
+            Common::Ggx(points) => {
+                self.mean_over_slopes(|i, j| f(wi, seen.normal(seen.ggx(points[i * self.nodes.len() + j]))))
             }
         }
-        2.0 * sum as f32
     }
+
+    /// One of both numbers chooses between mirrored facets, below 1/2 or not: half of its nodes will do.
+    #[inline(always)]
+    fn mean_over_slopes(&self, f: impl Fn(usize, usize) -> f32) -> f32 {
+        let mut sum = 0.0;
+        for (i, (_, wx)) in self.nodes[..self.nodes.len() / 2].iter().enumerate() {
+            for (j, (_, wy)) in self.nodes.iter().enumerate() {
+                sum += f64::from(f(i, j)) * wx * wy;
+            }
+        }
+        sum as f32
+    }
+}
+
+/// Nodes and weights over [0, 1]: the roots of the Legendre polynomial of degree `n`, by Newton's method.
+fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
+    let node = |i: usize| {
+        let mut x = -((i as f64 + 0.75) / (n as f64 + 0.5) * std::f64::consts::PI).cos();
+        let mut slope = 1.0;
+        for _ in 0..20 {
+            let (mut p, mut previous) = (x, 1.0);
+            for k in 2..=n {
+                let k = k as f64;
+                (p, previous) = (((2.0 * k - 1.0) * x * p - (k - 1.0) * previous) / k, p);
+            }
+            slope = n as f64 * (x * p - previous) / (x * x - 1.0);
+            let step = p / slope;
+            x -= step;
+            if step.abs() < 1e-15 {
+                break;
+            }
+        }
+        (0.5 + 0.5 * x, 1.0 / ((1.0 - x * x) * slope * slope))
+    };
+    (0..n).map(node).collect()
 }
 
 #[cfg(test)]
@@ -135,8 +172,8 @@ mod tests {
     #[test]
     fn quadrature_is_exact_for_polynomials() {
         for n in [32, 128] {
-            let q = Quadrature::new(n);
-            let integral = |power: i32| q.0.iter().map(|(x, w)| w * x.powi(power)).sum::<f64>();
+            let nodes = gauss_legendre(n);
+            let integral = |power: i32| nodes.iter().map(|(x, w)| w * x.powi(power)).sum::<f64>();
             for power in [0, 1, 2, 7, 40] {
                 assert!((integral(power) * f64::from(power + 1) - 1.0).abs() < 1e-12, "{n} {power}");
             }

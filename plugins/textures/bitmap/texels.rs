@@ -4,6 +4,7 @@ use half::f16;
 use lucerna_core::color::Rgb;
 use lucerna_core::image::{PixelData, Samples, srgb_byte_to_linear, srgb_to_linear};
 use lucerna_core::math::UVec2;
+use rayon::prelude::*;
 
 /// How texels are kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,13 +17,23 @@ pub(super) enum Format {
     Single,
 }
 
-/// How often each byte occurs in one of several interleaved channels.
-fn histogram(values: &[u8], channels: usize, channel: usize) -> [u64; 256] {
-    let mut counts = [0; 256];
-    for value in values.iter().skip(channel).step_by(channels) {
-        counts[usize::from(*value)] += 1;
-    }
-    counts
+/// How often each byte occurs in each of `N` interleaved channels.
+fn histograms<const N: usize>(values: &[u8]) -> [[u64; 256]; N] {
+    const PIECE: usize = 1 << 18;
+    let count = |pixels: &[[u8; N]]| {
+        let mut counts = [[0; 256]; N];
+        for pixel in pixels {
+            for (counts, value) in counts.iter_mut().zip(pixel) {
+                counts[usize::from(*value)] += 1;
+            }
+        }
+        counts
+    };
+    let add = |mut sum: [[u64; 256]; N], more: [[u64; 256]; N]| {
+        sum.iter_mut().flatten().zip(more.iter().flatten()).for_each(|(sum, more)| *sum += more);
+        sum
+    };
+    values.as_chunks::<N>().0.par_chunks(PIECE).map(count).reduce(|| [[0; 256]; N], add)
 }
 
 enum Storage {
@@ -130,13 +141,14 @@ impl Texels {
         let sum = match &self.storage {
             // Large pictures are mostly of this kind: counting is several times faster than adding up.
             Storage::Bytes(values, decode) => {
-                let total = |counts: [u64; 256]| -> f64 {
+                let total = |counts: &[u64; 256]| -> f64 {
                     counts.iter().zip(decode.iter()).map(|(count, value)| *count as f64 * f64::from(*value)).sum()
                 };
                 if self.grey {
-                    total(histogram(values, 1, 0))
+                    let [counts] = histograms(values);
+                    total(&counts)
                 } else {
-                    let [r, g, b] = [0, 1, 2].map(|channel| (total(histogram(values, 3, channel)) / count) as f32);
+                    let [r, g, b] = histograms(values).map(|counts| (total(&counts) / count) as f32);
                     return Rgb::new(r, g, b).luminance();
                 }
             }

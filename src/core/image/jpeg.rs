@@ -37,8 +37,8 @@ pub(super) fn read(bytes: &[u8], limits: &ReadLimits) -> Result<Option<(u32, u32
 /// By the JFIF standard (ITU-T T.871, section 7), rounded once.
 fn rgb([y, cb, cr]: [u8; 3]) -> [u8; 3] {
     let [y, cb, cr] = [f32::from(y), f32::from(cb) - 128.0, f32::from(cr) - 128.0];
-    // The cast clamps to bytes.
-    [y + 1.402 * cr, y - 0.344_136 * cb - 0.714_136 * cr, y + 1.772 * cb].map(|v| v.round() as u8)
+    // The cast cuts and clamps to bytes; `round` would be a call each.
+    [y + 1.402 * cr, y - 0.344_136 * cb - 0.714_136 * cr, y + 1.772 * cb].map(|v| (v + 0.5) as u8)
 }
 
 /// From the segments before the first scan; `None` if they are damaged.
@@ -142,5 +142,18 @@ mod tests {
         assert_eq!(rgb([76, 85, 255]), [254, 0, 0]);
         assert_eq!(rgb([29, 255, 107]), [0, 0, 254]);
         assert_eq!(rgb([0, 255, 255]), [178, 0, 225]);
+        // Rounded to the nearest, whatever the numbers: of each, 11 values that are spread over all.
+        let values = || (0..=255).step_by(25).map(|v| v as u8);
+        for (y, cb, cr) in values().flat_map(|y| values().flat_map(move |b| values().map(move |r| (y, b, r)))) {
+            let [yy, b, r] = [y, cb, cr].map(f64::from);
+            let exact = [
+                yy + 1.402 * (r - 128.0),
+                yy - 0.344_136 * (b - 128.0) - 0.714_136 * (r - 128.0),
+                yy + 1.772 * (b - 128.0),
+            ];
+            for (value, exact) in rgb([y, cb, cr]).map(f64::from).into_iter().zip(exact) {
+                assert!((value - exact.clamp(0.0, 255.0)).abs() < 0.5001, "{y} {cb} {cr}: {value} {exact}");
+            }
+        }
     }
 }
