@@ -9,7 +9,7 @@
 //! | cost of a leaf | 1 per triangle | 0.8 per pack |
 //! | triangles in a leaf | at most 3 | at most 8, tested at once |
 
-use super::builders::{BinaryNode, BinaryTree, block_len};
+use super::builders::{BinaryNode, BinaryTree, block_len, filled};
 use super::wide::{Frame, Node, WIDTH, Word};
 
 /// Cost of testing one pack, relative to one node.
@@ -81,7 +81,7 @@ impl Choice {
 /// Collapses `tree`, which must not be empty. `analytic` tells triangles (`None`) from the others
 /// (`Some`: their index).
 pub fn collapse(tree: &BinaryTree, frame: &Frame, analytic: &(dyn Fn(u32) -> Option<u32> + Sync)) -> Collapsed {
-    let mut choices = vec![Choice::UNSET; tree.nodes.len()];
+    let mut choices = filled(Choice::UNSET, tree.nodes.len());
     let (root, block) = choices.split_at_mut(1);
     // Areas relative to the whole, so that they neither overflow nor vanish.
     let unit = tree.nodes[0].bounds.half_area();

@@ -137,7 +137,7 @@ impl Accel {
 
         let degenerate = first - triangles.len() - analytic.len();
         let has_instances = analytic.iter().any(|(_, _, p)| p.is_instance());
-        let (mut bounds, numbers): (Vec<_>, Vec<_>) = triangles.into_iter().unzip();
+        let (mut bounds, numbers): (Vec<_>, Vec<_>) = triangles.into_par_iter().unzip();
         let triangle_count = numbers.len() as u32;
         bounds.extend(analytic.iter().map(|(_, bounds, _)| *bounds));
         let binary = match options.builder {

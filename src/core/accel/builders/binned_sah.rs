@@ -11,7 +11,7 @@
 //! Where the levels that remain would just do for halving, it halves: so the depth has a limit for any input, and
 //! coincident primitives cost no more than others.
 
-use super::{BinaryNode, BinaryTree, Builder, MAX_DEPTH, block_len};
+use super::{BinaryNode, BinaryTree, Builder, MAX_DEPTH, block_len, filled};
 use crate::math::Aabb;
 use glam::{Vec3, Vec3A};
 use rayon::prelude::*;
@@ -67,7 +67,7 @@ impl Builder for BinnedSah {
             .enumerate()
             .map(|(i, b)| Reference { min: b.min.into(), max: b.max.into(), prim: i as u32 })
             .collect();
-        let mut nodes = vec![BinaryNode::UNSET; (2 * bounds.len()).saturating_sub(1)];
+        let mut nodes = filled(BinaryNode::UNSET, (2 * bounds.len()).saturating_sub(1));
         if let Some((root, block)) = nodes.split_first_mut() {
             build_subtree(&mut references, root, block, 1, 0);
         }

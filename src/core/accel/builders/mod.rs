@@ -11,6 +11,7 @@ pub use binned_sah::BinnedSah;
 pub use ploc::Ploc;
 
 use crate::math::Aabb;
+use rayon::iter::ParallelIterator;
 
 /// No builder returns a deeper tree (the root alone has depth 0), so traversal needs a small fixed stack.
 pub const MAX_DEPTH: usize = 64;
@@ -64,6 +65,11 @@ impl BinaryTree {
         }
         depth.into_iter().max().unwrap_or(0) as usize
     }
+}
+
+/// So many of the same. By all threads: what takes time is the first touch of the memory.
+pub(super) fn filled<T: Copy + Send + Sync>(value: T, count: usize) -> Vec<T> {
+    rayon::iter::repeat_n(value, count).collect()
 }
 
 /// Length of the node block below a subtree of `count` primitives.
