@@ -5,6 +5,7 @@ mod cone;
 mod corrupted;
 mod determinism;
 mod field;
+mod published;
 #[path = "../support/mod.rs"]
 mod support;
 mod unbiased;

@@ -101,6 +101,12 @@ impl Accel {
     /// If a triangle refers to a vertex that is not there, if an analytic shape has bounds that are not finite, or if
     /// there are more than 2³⁰ primitives.
     pub fn build(items: &[(u32, Geometry)], options: &BuildOptions) -> Result<Self, String> {
+        // On a thread of the pool: each parallel step costs another thread a switch there, and a scene may have a million
+        // shapes.
+        rayon::scope(|_| Self::build_here(items, options))
+    }
+
+    fn build_here(items: &[(u32, Geometry)], options: &BuildOptions) -> Result<Self, String> {
         let mut sorted: Vec<_> = items.iter().collect();
         sorted.sort_by_key(|(shape, _)| *shape);
 
@@ -259,6 +265,8 @@ impl Accel {
 
 /// The exponent of an `f64`; alone, it is the power of two below the number.
 const EXPONENT: u64 = 0x7FF0_0000_0000_0000;
+/// Smaller meshes are not worth a second thread.
+const SERIAL: usize = 4096;
 const TOO_MANY: &str = "more than 2^30 primitives in one scene or group";
 
 /// Appends the bounds and numbers of all triangles that can be hit.
@@ -269,14 +277,21 @@ fn collect_triangles(
     first: u32,
     into: &mut Vec<(Aabb, u32)>,
 ) -> Result<(), String> {
-    if let Some(bad) = triangles.par_iter().position_first(|t| t.iter().any(|&i| i as usize >= positions.len())) {
+    if let Some(bad) =
+        triangles.par_iter().with_min_len(SERIAL).position_first(|t| t.iter().any(|&i| i as usize >= positions.len()))
+    {
         let count = positions.len();
         return Err(format!("shape {shape}: triangle {bad} refers to vertices {:?} of {count}", triangles[bad]));
     }
-    into.par_extend(triangles.par_iter().enumerate().filter_map(|(i, corners)| {
+    let hittable = |(i, corners): (usize, &[u32; 3])| {
         let points = corners.map(|i| positions[i as usize]);
         triangle::is_hittable(points).then(|| (Aabb::of_points(points), first + i as u32))
-    }));
+    };
+    if triangles.len() < SERIAL {
+        into.extend(triangles.iter().enumerate().filter_map(hittable));
+    } else {
+        into.par_extend(triangles.par_iter().enumerate().filter_map(hittable));
+    }
     Ok(())
 }
 
