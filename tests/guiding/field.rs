@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 const UNIT: Aabb = Aabb { min: Vec3::ZERO, max: Vec3::ONE };
 
-fn guide(parameters: &str) -> Arc<dyn Guide> {
+pub fn guide(parameters: &str) -> Arc<dyn Guide> {
     let text = format!("<guide version='3.0.0' type='sd_tree'>{parameters}</guide>");
     let description = load_str(&text, "guide.xml", &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
     match build_one(&lucerna::builtin(), &description) {

@@ -1,6 +1,7 @@
 //! Guided paths: unbiased whatever was learnt, the same bits for any number of threads, densities that are those of the
 //! samples.
 
+mod budget;
 mod cone;
 mod corrupted;
 mod determinism;

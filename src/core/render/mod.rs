@@ -15,7 +15,7 @@ mod tiles;
 mod training;
 
 pub use bad_samples::{BadSample, BadSamples};
-pub use control::{Budget, Control, OnPass, PassEnd, Progress, Schedule};
+pub use control::{Budget, Clock, Control, OnPass, PassEnd, Progress, Schedule};
 pub use film_store::FilmStore;
 pub use notebook::{Notebook, Scattering};
 pub use reference_order::ReferenceOrder;

@@ -165,7 +165,7 @@ impl<'r, 'a> Run<'r, 'a> {
                 break;
             }
             report.spp = end;
-            if cx.control.end_pass(end, &cx.film, &store).is_break() {
+            if cx.control.end_pass(end, &cx.film, || &store).is_break() {
                 break;
             }
         }

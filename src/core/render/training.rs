@@ -10,7 +10,7 @@
 use super::combine::{Iterations, Moments};
 use super::notebook::Notebook;
 use super::tiles::{Run, Tracer, asked_spp, points};
-use super::{Budget, RenderContext, RenderError, Report, SampleOrder};
+use super::{Budget, FilmStore, RenderContext, RenderError, Report, SampleOrder};
 use crate::interfaces::{Arena, CameraRay, EmitterSampling, Guide, GuideField, GuideLearner, Radiance, Training};
 use crate::sampling::Stream;
 use crate::scene::Scene;
@@ -71,12 +71,16 @@ pub fn render_guided(
     let points = points(cx, asked);
     let run = Run::new(cx, points.as_deref(), asked);
     let learner = guide.start(cx.scene.accel().bounds());
-    let mut lesson = Lesson { cx, run, estimator, training: guide.training(), learner, report: Report::default() };
-    let film = lesson.iterations(asked);
-    let Lesson { run, mut report, learner, .. } = lesson;
+    let empty = FilmStore::new(cx.store.size(), cx.store.aovs().to_vec());
+    let training = guide.training();
+    let pictures = Iterations::new(&empty, training.combination);
+    let report = Report::default();
+    let mut lesson = Lesson { cx, run, estimator, training, learner, pictures, report, asked, pace: 0.0 };
+    lesson.iterations();
+    let Lesson { run, mut report, learner, pictures, .. } = lesson;
     run.conclude(&mut report);
     report.notes = learner.summary();
-    cx.store.add(&film);
+    cx.store.add(&pictures.combined());
     Ok((report, learner.field()))
 }
 
@@ -87,71 +91,97 @@ struct Lesson<'r, 'a> {
     estimator: &'r dyn GuidedEstimator,
     training: Training,
     learner: Box<dyn GuideLearner>,
+    pictures: Iterations,
     report: Report,
+    /// Samples per pixel of the whole run.
+    asked: u32,
+    /// Seconds that a sample per pixel took in the latest pass; 0 before.
+    pace: f64,
+}
+
+/// An iteration.
+#[derive(Clone, Copy)]
+struct Part {
+    /// It is one of those at the start.
+    startup: bool,
+    /// Samples per pixel of the run when it is complete.
+    end: u32,
+    /// Whether paths note what they find.
+    learning: bool,
 }
 
 impl Lesson<'_, '_> {
-    fn iterations(&mut self, asked: u32) -> super::FilmStore {
-        let empty = super::FilmStore::new(self.cx.store.size(), self.cx.store.aovs().to_vec());
-        let mut pictures = Iterations::new(&empty, self.training.combination);
+    fn iterations(&mut self) {
         let mut pace = 0.0;
         for index in 0.. {
-            let startup = index < self.training.startup;
-            let wanted = if startup { 1 } else { 1_u32 << (index - self.training.startup).min(30) };
-            let left = self.samples_left(asked, pace);
-            // The one after it would not be completed: this one is the last, and as long as can be.
-            let last = !startup && wanted.saturating_mul(3) > left;
-            let size = if last { asked - self.report.spp } else { wanted.min(asked - self.report.spp) };
-            if size == 0 || (index > 0 && self.cx.control.should_stop()) {
-                break;
-            }
+            let Some(part) = self.part(index, pace) else { return };
             // The first ones share a picture, for one sample has no variance.
-            if index == 0 || !startup {
-                pictures.begin();
+            if index == 0 || !part.startup {
+                self.pictures.begin();
             }
             let (before, spp_before) = (self.cx.control.seconds(), self.report.spp);
-            let learning = !last && self.report.spp + size < asked;
-            if !self.iteration(&mut pictures, size, learning) {
-                break;
+            if !self.iteration(part) {
+                return;
             }
-            if !startup || index + 1 == self.training.startup {
-                pictures.complete();
+            if !part.startup || index + 1 == self.training.startup {
+                self.pictures.complete();
             }
-            if learning {
-                self.learner.refine(size);
+            if part.learning {
+                self.learner.refine(part.end - spp_before);
             }
-            let done = f64::from(self.report.spp - spp_before);
-            pace = (self.cx.control.seconds() - before) / done;
-        }
-        pictures.combined()
-    }
-
-    /// Samples per pixel that the budget still allows, about.
-    fn samples_left(&self, asked: u32, pace: f64) -> u32 {
-        let left = asked - self.report.spp;
-        match (self.cx.budget, self.cx.control.time_fraction()) {
-            (Budget::Seconds(_), Some(fraction)) if fraction > 0.0 && pace > 0.0 => {
-                let seconds = self.cx.control.seconds() * (1.0 / fraction - 1.0);
-                left.min((seconds / pace) as u32)
-            }
-            _ => left,
+            pace = (self.cx.control.seconds() - before) / f64::from(part.end - spp_before);
         }
     }
 
-    /// Takes so many samples per pixel. Whether they are complete and the run is to go on.
-    fn iteration(&mut self, pictures: &mut Iterations, size: u32, learning: bool) -> bool {
-        let end = self.report.spp.saturating_add(size);
-        while self.report.spp < end {
+    /// The iteration of this number, if there is to be one; those before it took `pace` seconds for a sample per pixel.
+    fn part(&self, index: u32, pace: f64) -> Option<Part> {
+        let startup = index < self.training.startup;
+        let wanted = if startup { 1 } else { 1_u32 << (index - self.training.startup).min(30) };
+        // The one after it would not be completed: this one is the last, and as long as can be.
+        let last = !startup && wanted.saturating_mul(3) > self.samples_left(pace);
+        let left = self.asked - self.report.spp;
+        let size = if last { left } else { wanted.min(left) };
+        if size == 0 || (index > 0 && self.cx.control.should_stop()) {
+            return None;
+        }
+        Some(Part { startup, end: self.report.spp + size, learning: !last && size < left })
+    }
+
+    /// Samples per pixel that the budget still allows, about, at so many seconds each.
+    fn samples_left(&self, pace: f64) -> u32 {
+        let left = self.asked - self.report.spp;
+        self.samples_in_time(pace).map_or(left, |samples| left.min(samples))
+    }
+
+    /// Samples per pixel until the time of the budget is over, if it is one of time and the pace is known.
+    fn samples_in_time(&self, pace: f64) -> Option<u32> {
+        let is_time = matches!(self.cx.budget, Budget::Seconds(_)) && pace > 0.0;
+        let seconds = self.cx.control.seconds_left().filter(|_| is_time)?;
+        Some((seconds / pace) as u32)
+    }
+
+    /// Where a pass ends that begins now. One that the deadline cuts short is lost: towards the end, passes take half of
+    /// the time that is left, so that no more than a sample per pixel is.
+    fn pass_end(&self, part: Part) -> u32 {
+        let start = self.report.spp;
+        let most = self.samples_in_time(self.pace).map_or(LONGEST_PASS, |samples| (samples / 2).max(1));
+        start + (start / 8).clamp(1, LONGEST_PASS).min(most).min(part.end - start)
+    }
+
+    /// Takes the samples of an iteration. Whether they are complete and the run is to go on.
+    fn iteration(&mut self, part: Part) -> bool {
+        while self.report.spp < part.end {
             let start = self.report.spp;
             if start > 0 && self.cx.control.should_stop() {
                 return false;
             }
-            let next = start + (start / 8).clamp(1, LONGEST_PASS).min(end - start);
-            if !self.pass(pictures, (start, next), learning) {
+            let (next, began) = (self.pass_end(part), self.cx.control.seconds());
+            if !self.pass((start, next), part.learning) {
                 return false;
             }
             let control = self.cx.control;
-            if control.watches_passes() && control.end_pass(next, &self.cx.film, &pictures.combined()).is_break() {
+            self.pace = (control.seconds() - began) / f64::from(next - start);
+            if control.end_pass(next, &self.cx.film, || self.pictures.combined()).is_break() {
                 return false;
             }
         }
@@ -159,8 +189,8 @@ impl Lesson<'_, '_> {
     }
 
     /// One pass; one that is cut short is lost, but for the first.
-    fn pass(&mut self, pictures: &mut Iterations, (start, end): (u32, u32), learning: bool) -> bool {
-        let mut film = pictures.film();
+    fn pass(&mut self, (start, end): (u32, u32), learning: bool) -> bool {
+        let mut film = self.pictures.film();
         let mut moments = Vec::new();
         let sample_emitters = match self.training.emitter_sampling {
             EmitterSampling::Never => false,
@@ -186,7 +216,7 @@ impl Lesson<'_, '_> {
         if !complete && start > 0 {
             return false;
         }
-        pictures.extend(film, end - start, &moments);
+        self.pictures.extend(film, end - start, &moments);
         self.report.spp = if complete { end } else { start };
         complete
     }
