@@ -4,6 +4,7 @@ mod check;
 mod compare;
 mod convert;
 mod info;
+mod keeping;
 mod plugins;
 mod render;
 mod scene_args;

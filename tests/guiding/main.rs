@@ -6,6 +6,7 @@ mod cone;
 mod corrupted;
 mod determinism;
 mod field;
+mod kept;
 #[path = "../support/mod.rs"]
 mod support;
 mod unbiased;

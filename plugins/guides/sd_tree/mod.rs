@@ -40,6 +40,7 @@
 
 mod cylinder;
 mod field;
+mod kept;
 mod learner;
 mod mixing;
 mod quadtree;
@@ -47,6 +48,7 @@ mod spatial;
 
 use learner::Learner;
 use lucerna_core::interfaces::{Combination, EmitterSampling, Guide, GuideLearner, MOST_GUIDED, Training};
+use lucerna_core::io::Result;
 use lucerna_core::math::Aabb;
 use lucerna_core::scene::{Built, Constructor, Param, Plugin, Properties};
 use std::sync::Arc;
@@ -60,7 +62,7 @@ pub const PLUGIN: Plugin = Plugin {
         Param::float("spatial_threshold", 1000.0, "records after which a cell of space is halved").at_least(1.0),
         Param::float("directional_threshold", 0.01, "part of the flux above which a cell of directions is divided")
             .range(1e-6, 1.0),
-        Param::int("directional_depth", 20, "levels of quadtrees at most").range(3.0, 20.0),
+        Param::int("directional_depth", 20, "levels of quadtrees at most").range(3.0, quadtree::MOST_LEVELS as f64),
         Param::choice("spatial_filter", &["nearest", "stochastic", "box"], "stochastic", "cells a record goes to"),
         Param::choice("directional_filter", &["nearest", "box"], "box", "directions a record goes to"),
         Param::float_opt("p_guide", "probability of the guide; learnt if unset").range(0.0, 1.0),
@@ -156,5 +158,13 @@ impl Guide for SdTree {
 
     fn training(&self) -> Training {
         self.training
+    }
+
+    fn kept_as(&self) -> Option<&'static str> {
+        Some(PLUGIN.name)
+    }
+
+    fn recall(&self, bounds: Aabb, saved: &[u8]) -> Result<Box<dyn GuideLearner>> {
+        Ok(Box::new(Learner::unpack(self.settings, bounds, saved)?))
     }
 }

@@ -177,16 +177,16 @@ impl<'a> Control<'a> {
         store: impl FnOnce() -> S,
     ) -> ControlFlow<()> {
         let Some(on_pass) = self.on_pass else { return ControlFlow::Continue(()) };
-        let (seconds, began) = (self.seconds(), self.elapsed());
-        let store = store();
-        let flow = on_pass(PassEnd { spp, seconds, film, store: store.borrow() });
-        self.leave_out_since(began);
-        flow
+        let seconds = self.seconds();
+        self.aside(|| on_pass(PassEnd { spp, seconds, film, store: store().borrow() }))
     }
 
-    /// What was done since the clock showed `began` was no rendering.
-    fn leave_out_since(&self, began: Duration) {
+    /// Does something that does not count as rendering, between passes.
+    pub(crate) fn aside<T>(&self, work: impl FnOnce() -> T) -> T {
+        let began = self.elapsed();
+        let done = work();
         self.aside.fetch_add(self.elapsed().saturating_sub(began).as_nanos() as u64, Ordering::Relaxed);
+        done
     }
 
     pub(crate) fn progress(&self, progress: Progress) {
