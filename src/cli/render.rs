@@ -116,7 +116,7 @@ pub fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
-fn numbers<const N: usize>(text: &str) -> Result<[u32; N], String> {
+pub fn numbers<const N: usize>(text: &str) -> Result<[u32; N], String> {
     let list: Result<Vec<u32>, _> = text.split(',').map(|part| part.trim().parse::<u32>()).collect();
     list.ok().and_then(|list| list.try_into().ok()).ok_or_else(|| format!("expected {N} whole numbers"))
 }
@@ -216,13 +216,18 @@ fn check_complete(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
     if missing.is_empty() { Ok(()) } else { Err(Failure(missing.join("\n"))) }
 }
 
+/// A sensor by its number.
+pub fn sensor(scene: &Scene, number: usize) -> Result<&BuiltSensor, Failure> {
+    let count = scene.sensors().len();
+    scene.sensors().get(number).ok_or_else(|| match count {
+        1 => Failure::new(format!("there is no sensor {number}: the scene has one, number 0")),
+        _ => Failure::new(format!("there is no sensor {number}: the scene has {count}, counted from 0")),
+    })
+}
+
 /// The chosen sensor, with another sampler if one is asked for.
 fn camera(registry: &Registry, scene: &Scene, arguments: &Arguments) -> Result<BuiltSensor, Failure> {
-    let count = scene.sensors().len();
-    let mut camera = scene.sensors().get(arguments.sensor).cloned().ok_or_else(|| match count {
-        1 => Failure::new(format!("there is no sensor {}: the scene has one, number 0", arguments.sensor)),
-        _ => Failure::new(format!("there is no sensor {}: the scene has {count}, counted from 0", arguments.sensor)),
-    })?;
+    let mut camera = sensor(scene, arguments.sensor)?.clone();
     if let Some(text) = &arguments.sampler {
         let node = short_form::parse(ObjectKind::Sampler, text, "--sampler").map_err(Failure::new)?;
         if let Object::Sampler(sampler) = build_one(registry, &Description::of(node))? {

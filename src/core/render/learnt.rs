@@ -40,7 +40,7 @@ impl Learnt {
     /// If it cannot be read or is damaged; with the name of the file.
     pub fn read(path: &Path) -> std::result::Result<Self, RenderError> {
         let content = sealed::read(path, KIND);
-        content.and_then(|content| Learnt::unpack(&content)).map_err(|e| at(path, &e))
+        content.and_then(|content| Learnt::of_content(&content)).map_err(|e| at(path, &e))
     }
 
     /// The content of a file in memory.
@@ -48,7 +48,7 @@ impl Learnt {
     /// # Errors
     /// If it is damaged.
     pub fn of_bytes(file: &[u8]) -> Result<Self> {
-        Learnt::unpack(sealed::unseal(KIND, file)?)
+        Learnt::of_content(sealed::unseal(KIND, file)?)
     }
 
     /// As a file in memory.
@@ -74,7 +74,11 @@ impl Learnt {
         to.0
     }
 
-    fn unpack(content: &[u8]) -> Result<Self> {
+    /// What stands between head and checksum of a file.
+    ///
+    /// # Errors
+    /// If it is damaged.
+    pub fn of_content(content: &[u8]) -> Result<Self> {
         let mut from = Cursor::new(content);
         let guide = from.text("the name of the guide")?;
         let mut corner = || Ok(Vec3::new(from.f32("bounds")?, from.f32("bounds")?, from.f32("bounds")?));
