@@ -43,6 +43,29 @@ impl GuidedEstimator for Samples {
     }
 }
 
+/// Samples whose deviation is multiplied with each lesson from the twelfth on.
+struct Noise {
+    iterations: Arc<AtomicU64>,
+    factor: f32,
+}
+
+impl GuidedEstimator for Noise {
+    fn radiance(
+        &self,
+        _scene: &Scene,
+        _camera: &CameraRay,
+        stream: &mut Stream<'_>,
+        _arena: &mut Arena,
+        _aovs: &mut [f32],
+        _guidance: Guidance<'_>,
+        _notes: &mut Notebook,
+    ) -> Radiance {
+        let lessons = self.iterations.load(Ordering::Relaxed).saturating_sub(12) as i32;
+        let deviation = 0.9 * self.factor.powi(lessons);
+        Radiance { rgb: Rgb::splat(1.0 + deviation * (2.0 * stream.next_1d() - 1.0)), alpha: 1.0, rays: 1 }
+    }
+}
+
 /// A guide that takes 20 ms to learn.
 struct Slow {
     inner: Arc<dyn Guide>,
@@ -118,4 +141,26 @@ fn hc_p18_a_time_limit_is_kept_and_used() {
         let part = of_the_last as f64 / report.samples as f64;
         assert!((0.4..0.8).contains(&part), "{seconds}: {part} of the samples are in the last iteration");
     }
+}
+
+/// Where learning no longer lowers the variance it is over at 256 samples per pixel; where it does, it goes on as long as the
+/// budget allows. Lessons: eight at the start, then after 1, 2, 4, … samples.
+#[test]
+fn learning_ends_when_it_no_longer_pays() {
+    let lessons = |ending: &str, factor: f32, spp: u32| {
+        let iterations = Arc::new(AtomicU64::new(0));
+        let inner = field::guide(&format!("<string name='ending' value='{ending}'/>"));
+        let guide = Slow { inner, clock: Nanoseconds::default(), iterations: iterations.clone() };
+        let scene = scene(SCENES[0].1, "<integrator type='path'/>");
+        let (control, budget) = (Control::new(), Budget::Samples(spp));
+        let mut cx = RenderContext::new(&scene, &scene.sensors()[0], budget, 1, &control, Vec::new());
+        let noise = Noise { iterations: iterations.clone(), factor };
+        let (report, _) = render_guided(&mut cx, &noise, &guide).expect("it renders");
+        assert_eq!(report.spp, spp);
+        iterations.load(Ordering::Relaxed)
+    };
+    // 8 + 1 + 2 + … + 128 = 263 samples are behind the sixteenth lesson.
+    assert_eq!([1.0, 0.5].map(|factor| lessons("variance", factor, 4000)), [16, 18]);
+    assert_eq!([1.0, 0.5].map(|factor| lessons("doubling", factor, 4000)), [18, 18]);
+    assert_eq!(lessons("variance", 1.0, 500), lessons("doubling", 1.0, 500), "too early to tell");
 }

@@ -20,6 +20,7 @@
 //! | `nee` | string | always | when lights are sampled: `never`, `kickstart` (the first 128 samples per pixel), `always` |
 //! | `direct` | boolean | true | light that emitter sampling also finds is learnt, times the weight of finding it by scattering |
 //! | `startup` | integer | 8 | iterations of one sample per pixel before those that double |
+//! | `ending` | string | doubling | when the last iteration begins: once the one after it could not be completed (`doubling`), or, from 256 samples per pixel on, as soon as the `variance` that the rest of the budget would leave rises from one iteration to the next |
 //! | `combination` | string | inverse_variance | which iterations make the picture: the last four by `inverse_variance`, or the `last` |
 //! | `max_memory` | float | 64 | MiB that the trees may take; then they stay coarser |
 //!
@@ -47,7 +48,7 @@ mod quadtree;
 mod spatial;
 
 use learner::Learner;
-use lucerna_core::interfaces::{Combination, EmitterSampling, Guide, GuideLearner, MOST_GUIDED, Training};
+use lucerna_core::interfaces::{Combination, EmitterSampling, Ending, Guide, GuideLearner, MOST_GUIDED, Training};
 use lucerna_core::io::Result;
 use lucerna_core::math::Aabb;
 use lucerna_core::scene::{Built, Constructor, Param, Plugin, Properties};
@@ -71,6 +72,7 @@ pub const PLUGIN: Plugin = Plugin {
         Param::choice("nee", &["never", "kickstart", "always"], "always", "when lights are sampled"),
         Param::bool("direct", true, "learns light that emitter sampling also finds, by its weight"),
         Param::int("startup", 8, "iterations of one sample per pixel at the start").range(0.0, 64.0),
+        Param::choice("ending", &["doubling", "variance"], "doubling", "when the last iteration begins"),
         Param::choice(
             "combination",
             &["inverse_variance", "last"],
@@ -131,6 +133,10 @@ fn build(p: &Properties<'_>) -> Built<dyn Guide> {
     };
     let training = Training {
         startup: number("startup"),
+        ending: match p.choice("ending") {
+            "variance" => Ending::Variance,
+            _ => Ending::Doubling,
+        },
         combination: match p.choice("combination") {
             "last" => Combination::Last,
             _ => Combination::InverseVariance,

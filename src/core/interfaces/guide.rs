@@ -44,6 +44,8 @@ pub trait Guide: Send + Sync {
 pub struct Training {
     /// Iterations of one sample per pixel at the start, so that the field finds out where paths go.
     pub startup: u32,
+    /// When the last iteration begins.
+    pub ending: Ending,
     /// What becomes of the pictures of the iterations.
     pub combination: Combination,
     /// When lights are sampled.
@@ -52,6 +54,16 @@ pub struct Training {
     pub learn_direct: bool,
     /// Narrower lobes than this are not guided.
     pub least_roughness: f32,
+}
+
+/// When the last iteration begins, which has all that is left of the budget.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// Once the iteration after it could not be completed.
+    Doubling,
+    /// Then, or when the variance that the rest of the budget would leave no longer falls from iteration to iteration
+    /// (Müller, Gross, Novák 2017, section 5).
+    Variance,
 }
 
 /// What becomes of the pictures of the iterations.

@@ -141,6 +141,12 @@ impl Iterations {
         }
     }
 
+    /// Mean variance of one sample of the latest iteration, if it is known.
+    pub fn variance(&self) -> Option<f64> {
+        let [even, odd] = self.kept.back()?.variances()?;
+        Some(0.5 * (even + odd))
+    }
+
     /// Weights of the iterations' means in both halves; they sum to 1.
     fn weights(&self) -> Vec<[f64; 2]> {
         let sampled: Vec<&Iteration> = self.kept.iter().collect();

@@ -39,6 +39,11 @@ pub(super) struct Course {
     pub part: Option<Part>,
     /// Seconds that a sample per pixel took in the iteration before; 0 if there is none.
     pub pace: f64,
+    /// Variance that the picture would have if the rest of the budget were spent as the iteration before was; infinite if
+    /// that is not known.
+    pub expected: f64,
+    /// It has risen: more is not worth learning.
+    pub enough: bool,
 }
 
 /// Where a run stands.
@@ -54,8 +59,18 @@ impl Standing {
     pub fn begin(cx: &RenderContext<'_>, guide: &dyn Guide) -> std::result::Result<Self, RenderError> {
         let bounds = cx.scene.accel().bounds();
         let startup = guide.training().startup;
-        let mut course =
-            Course { seed: cx.seed, startup, first: 1, reach: 0, taught: false, index: 0, part: None, pace: 0.0 };
+        let mut course = Course {
+            seed: cx.seed,
+            startup,
+            first: 1,
+            reach: 0,
+            taught: false,
+            index: 0,
+            part: None,
+            pace: 0.0,
+            expected: f64::INFINITY,
+            enough: false,
+        };
         let open = |file: &GuideFile| file.open(guide, bounds);
         let learner = match cx.guide_file.as_ref().map(open).transpose()?.flatten() {
             Some((learnt, learner)) => {
@@ -76,9 +91,11 @@ impl Standing {
 
     /// Writes it. `learner` is what was known at the end of the latest pass, `report` what was told then.
     pub fn pack(&self, learner: &[u8], report: &Report, seconds: f64, to: &mut Packer) {
-        let Course { seed, startup, first, reach, taught, index, part, pace } = self.course;
-        [seed, startup, first, reach, u32::from(taught), index].into_iter().for_each(|number| to.u32(number));
+        let Course { seed, startup, first, reach, taught, index, part, pace, expected, enough } = self.course;
+        let numbers = [seed, startup, first, reach, u32::from(taught), index, u32::from(enough)];
+        numbers.into_iter().for_each(|number| to.u32(number));
         to.f64(pace);
+        to.f64(expected);
         if let Some(Part { startup, spp, wanted, learning }) = part {
             [u32::from(startup), spp.0, spp.1, wanted, u32::from(learning)].into_iter().for_each(|v| to.u32(v));
         }
@@ -94,8 +111,8 @@ impl Standing {
     pub fn unpack(from: &mut Cursor<'_>, cx: &RenderContext<'_>, guide: &dyn Guide, asked: u32) -> Result<Self> {
         let mut next = || from.u32("the course of the run");
         let (seed, startup, first) = (next()?, next()?, next()?);
-        let (reach, taught, index) = (next()?, next()? != 0, next()?);
-        let pace = from.f64("the course of the run")?;
+        let (reach, taught, index, enough) = (next()?, next()? != 0, next()?, next()? != 0);
+        let (pace, expected) = (from.f64("the course of the run")?, from.f64("the course of the run")?);
         let mut next = || from.u32("an iteration");
         let begun = next()? != 0;
         let (spp, wanted, learning) = ((next()?, next()?), next()?, next()? != 0);
@@ -108,7 +125,7 @@ impl Standing {
         let mut pictures = Iterations::new(&empty, guide.training().combination);
         pictures.unpack(from)?;
         let learner = guide.recall(cx.scene.accel().bounds(), from.block("what was learnt")?)?;
-        let course = Course { seed, startup, first, reach, taught, index, part: Some(part), pace };
+        let course = Course { seed, startup, first, reach, taught, index, part: Some(part), pace, expected, enough };
         Ok(Standing { course, report, pictures, learner })
     }
 }

@@ -4,7 +4,8 @@
 //! they find; what a field gives does not change meanwhile. So every picture is unbiased, and has the same bits for any
 //! number of threads. First come some iterations of one sample per pixel, by which the field learns where paths go at
 //! all; then each has twice the samples of the one before. The last one takes all that is left of the budget, once the
-//! one after it could not be completed, and notes nothing (Müller, Gross, Novák 2017, section 5; Müller 2019, sections
+//! one after it could not be completed (or learning more no longer pays: [`Ending`]), and notes nothing, unless what is
+//! learnt is kept (Müller, Gross, Novák 2017, section 5; Müller 2019, sections
 //! 10.2 and 10.7). How the pictures become one: [`super::combine`].
 
 use super::checkpoint::Keeper;
@@ -13,7 +14,7 @@ use super::notebook::Notebook;
 use super::standing::{Course, Part, Standing};
 use super::tiles::{Run, Tracer, asked_spp, points};
 use super::{Budget, Learnt, RenderContext, RenderError, Report, SampleOrder};
-use crate::interfaces::{Arena, CameraRay, EmitterSampling, Guide, GuideField, Radiance, Training};
+use crate::interfaces::{Arena, CameraRay, EmitterSampling, Ending, Guide, GuideField, Radiance, Training};
 use crate::sampling::Stream;
 use crate::scene::Scene;
 use glam::IVec2;
@@ -27,6 +28,9 @@ const LONGEST_PASS: u32 = 16;
 
 /// Samples per pixel until which lights are sampled if that is for a start only (the default of the public code).
 const KICKSTART: u32 = 128;
+
+/// Samples per pixel from which an extrapolated variance is believed.
+const BELIEVED: u32 = 256;
 
 /// What holds during a pass.
 #[derive(Clone, Copy)]
@@ -153,7 +157,19 @@ impl Lesson<'_, '_> {
             }
             let pace = (self.cx.control.seconds() - seconds) / f64::from(now.max(1));
             self.at.course = Course { index: index + 1, part: None, pace, ..self.at.course };
+            if !part.startup {
+                self.expect(pace);
+            }
         }
+    }
+
+    /// Extrapolates the variance of the picture from the latest iteration, and judges by that if it is to be.
+    fn expect(&mut self, pace: f64) {
+        let left = f64::from(self.samples_left(pace));
+        let expected = self.at.pictures.variance().map_or(f64::INFINITY, |variance| variance / left);
+        let rises = expected > self.at.course.expected && self.at.report.spp >= BELIEVED;
+        self.at.course.enough |= rises && self.training.ending == Ending::Variance;
+        self.at.course.expected = expected;
     }
 
     /// The next iteration, if there is to be one.
@@ -163,10 +179,11 @@ impl Lesson<'_, '_> {
         let (frozen, keeps) = (file.is_some_and(|file| file.frozen), file.is_some_and(|file| !file.frozen));
         let is_startup = index < startup;
         let wanted = if is_startup { 1 } else { first.saturating_mul(1 << (index - startup).min(30)) };
+        let enough = frozen || self.at.course.enough;
         let (begin, left) = (self.at.report.spp, self.asked - self.at.report.spp);
         let likely = self.samples_left(pace);
         // The one after it would not be completed: this one is the last, and as long as can be.
-        let last = frozen || (!is_startup && wanted.saturating_mul(3) > likely);
+        let last = enough || (!is_startup && wanted.saturating_mul(3) > likely);
         let size = if last { left } else { wanted.min(left) };
         // Nobody learns from the last one, unless what was learnt is kept.
         let learning = if last || size == left { keeps && wanted <= likely } else { true };
