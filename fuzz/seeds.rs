@@ -31,6 +31,7 @@ fn main() {
     ply();
     obj();
     serialized();
+    guides();
     for (name, size) in [("one.vol", [1i32, 1, 1, 1]), ("grid.vol", [2, 3, 1, 3])] {
         let head = [b"VOL\x03".to_vec(), 1i32.to_le_bytes().to_vec(), size.map(i32::to_le_bytes).concat()].concat();
         let count = size.iter().product::<i32>() as usize;
@@ -249,4 +250,36 @@ fn dictionary() {
     words.dedup();
     let lines: String = words.iter().map(|word| format!("\"{word}\"\n")).collect();
     fs::write(Path::new(env!("CARGO_MANIFEST_DIR")).join("xml.dict"), lines).expect("a file");
+}
+
+/// What a guide has learnt: the content of files, without head and checksum. Of nothing, of one cell, of several.
+fn guides() {
+    use lucerna::core::interfaces::{GuideRecord, RecordKind};
+    use lucerna::core::math::{Aabb, Vec3};
+    use lucerna::core::render::Learnt;
+    use lucerna::core::scene::xml::{LoadOptions, load_str};
+    use lucerna::core::scene::{Object, build_one};
+    let settings = "<float name='spatial_threshold' value='40'/><integer name='directional_depth' value='4'/>";
+    let text = format!("<guide version='3.0.0' type='sd_tree'>{settings}</guide>");
+    let description = load_str(&text, "guide.xml", &LoadOptions::default()).expect("a guide");
+    let Ok(Object::Guide(guide)) = build_one(&lucerna::builtin(), &description) else { panic!("a guide") };
+    let bounds = Aabb { min: Vec3::ZERO, max: Vec3::ONE };
+    for (name, records) in [("nothing.guide", 0), ("one.guide", 30), ("cells.guide", 200)] {
+        let mut learner = guide.start(bounds);
+        let record = |i: u32| {
+            let u = |k: u32| (i.wrapping_mul(k) % 1009) as f32 / 1009.0;
+            let d = Vec3::new(u(7) - 0.5, u(11) - 0.5, 0.6).normalize();
+            let (radiance, kind) = (1.0 + u(5), RecordKind::Mixed);
+            let p = Vec3::new(u(601), u(353), u(197));
+            GuideRecord { p, d, radiance, scattered: radiance, pdf: 0.5, pdf_bsdf: 0.3, pdf_guide: 0.7, kind }
+        };
+        for _ in 0..2 {
+            learner.learn(&[(0..records).map(record).collect()]);
+            learner.refine(1);
+        }
+        // Some of the next iteration, so that there are sums.
+        learner.learn(&[(0..records / 20).map(record).collect()]);
+        let learnt = Learnt { guide: "sd_tree".to_owned(), bounds, spp: 1, state: learner.save() };
+        save("guide", name, &learnt.to_bytes()[12..learnt.to_bytes().len() - 4]);
+    }
 }

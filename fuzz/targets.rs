@@ -6,11 +6,14 @@
 #![allow(dead_code)] // Each fuzz target uses one.
 
 use lucerna::core::image::{self, ReadLimits, exr as exr_files};
+use lucerna::core::interfaces::{Arena, Guide, SurfaceHit};
 use lucerna::core::io;
+use lucerna::core::math::{Vec2, Vec3};
+use lucerna::core::render::Learnt;
 use lucerna::core::scene::xml::{LoadOptions, load_str};
-use lucerna::core::scene::{Registry, instantiate, resolve, upgrade};
+use lucerna::core::scene::{Object, Registry, build_one, instantiate, resolve, upgrade};
 use std::path::PathBuf;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// A reader of one kind of file: whether it accepts these bytes.
 pub type Target = fn(&[u8]) -> bool;
@@ -18,6 +21,7 @@ pub type Target = fn(&[u8]) -> bool;
 /// All targets by name.
 pub const ALL: &[(&str, Target)] = &[
     ("exr", exr),
+    ("guide", guide),
     ("obj", obj),
     ("pfm", pfm),
     ("picture", picture),
@@ -53,6 +57,27 @@ pub fn xml(bytes: &[u8]) -> bool {
     }
     upgrade::upgrade(&mut description);
     instantiate(registry, description, lenient).is_ok()
+}
+
+/// What a guide has learnt. The checksum is made right, or nothing would come past it.
+pub fn guide(bytes: &[u8]) -> bool {
+    static GUIDE: OnceLock<Option<Arc<dyn Guide>>> = OnceLock::new();
+    let guide = GUIDE.get_or_init(|| {
+        let text = "<guide version='3.0.0' type='sd_tree'/>";
+        let description = load_str(text, "guide.xml", &LoadOptions::default()).ok()?;
+        match build_one(&lucerna::builtin(), &description) {
+            Ok(Object::Guide(guide)) => Some(guide),
+            _ => None,
+        }
+    });
+    let (Some(guide), Ok(learnt)) = (guide, Learnt::of_content(bytes)) else { return false };
+    let Ok(learner) = learnt.recall(&**guide, learnt.bounds) else { return false };
+    let (arena, hit) = (Arena::new(), SurfaceHit { wi: Vec3::Z, ..SurfaceHit::default() });
+    if let Some(directions) = learner.field().at(&hit, true, &arena) {
+        let (d, pdf) = directions.sample(Vec2::splat(0.5));
+        assert!(d.is_finite() && pdf >= 0.0);
+    }
+    !learner.facts().is_empty()
 }
 
 /// A mesh in the PLY format.

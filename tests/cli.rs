@@ -297,3 +297,110 @@ fn mistakes_are_told_with_exit_code_2() {
     }
     assert_eq!(lucerna(&["--version"]).stdout.trim(), format!("lucerna {}", env!("CARGO_PKG_VERSION")));
 }
+
+/// A sd_tree with cells enough to look at, and the file it leaves.
+const GUIDED: [&str; 4] = ["--integrator", "path", "--guide", "sd_tree:spatial_threshold=100"];
+
+#[test]
+fn what_a_guide_has_learnt_is_kept_told_and_drawn() {
+    let learnt = temporary("guide", "box.guide");
+    let keeps = [&GUIDED[..], &["--spp", "24", "--guide-file", text(&learnt)]].concat();
+    let plain = cornell("guide", "plain.exr", &[&GUIDED[..], &["--spp", "24"]].concat());
+    assert_eq!(cornell("guide", "first.exr", &keeps).image.data, plain.image.data);
+    let frozen = [&keeps[..], &["--guide-frozen"]].concat();
+    let second = cornell("guide", "second.exr", &frozen);
+    assert_ne!(second.image.data, plain.image.data);
+    assert_eq!(cornell("guide", "third.exr", &frozen).image.data, second.image.data);
+
+    let told = done(&["guide", "info", text(&learnt), "--json"]).stdout;
+    let told: serde_json::Value = serde_json::from_str(&told).expect("JSON");
+    let cells = told["learnt"]["cells_of_space"].as_u64().expect("a number");
+    let by_depth = told["learnt"]["cells_of_space_by_depth"].as_array().expect("numbers");
+    assert_eq!(by_depth.iter().filter_map(serde_json::Value::as_u64).sum::<u64>(), cells);
+    assert!(told["guide"] == "sd_tree" && cells > 4 && told["learnt"]["fluence"][1].as_f64() > Some(0.0), "{told}");
+    assert!(done(&["guide", "info", text(&learnt)]).stdout.contains(&format!("cells of space: {cells}\n")));
+
+    let (drawn, wide) = (temporary("guide", "drawn.png"), temporary("guide", "wide.png"));
+    let view = |output: &Path, pixels: &[&str]| {
+        let more = pixels.iter().flat_map(|pixel| ["--pixel", pixel]);
+        let fixed = ["guide", "view", "-D", "res=16", "--guide-file", text(&learnt), "-o", text(output)];
+        lucerna(&fixed.into_iter().chain(more).collect::<Vec<_>>())
+    };
+    let run = view(&drawn, &["8,12"]);
+    assert!(run.code == 0 && run.stdout.contains("pixel 8,12: at [") && run.stdout.contains("times uniform"));
+    assert_eq!(view(&wide, &["8,12", "3,3", "12,8"]).code, 0);
+    let [one, three] = [&drawn, &wide].map(|path| image::read(path, &ReadLimits::default()).expect("a picture"));
+    assert!(three.width == 3 * one.width && three.height == one.height);
+    let run = view(&drawn, &["16,0"]);
+    assert!(run.code == 2 && run.stderr.contains("16 x 16 pixels"), "{}", run.stderr);
+}
+
+/// Every way in which a file of learnt state is of no use: one line, exit code 2, nothing written.
+#[test]
+fn hc_i22_files_of_learnt_state_that_are_of_no_use_are_told() {
+    let (learnt, other) = (temporary("no_guide", "box.guide"), temporary("no_guide", "other.guide"));
+    let output = temporary("no_guide", "box.exr");
+    let keeps = [&GUIDED[..], &["--spp", "8", "--guide-file", text(&learnt)]].concat();
+    cornell("no_guide", "box.exr", &keeps);
+    let told = |more: &[&str], expected: &str| {
+        let _ = std::fs::remove_file(&output);
+        let run = lucerna(&[&["render", "-q", "-D", "res=16", "-o", text(&output)], more].concat());
+        let lines = run.stderr.trim_end().lines().count();
+        assert!(run.code == 2 && lines == 1 && run.stderr.contains(expected), "{expected}: {}", run.stderr);
+        assert!(!output.exists());
+    };
+    let with = |file: &'static str| -> Vec<String> {
+        let file = folder_of("cli", "no_guide").join(file);
+        GUIDED
+            .iter()
+            .map(|word| (*word).to_owned())
+            .chain(["--guide-file".to_owned(), text(&file).to_owned()])
+            .collect()
+    };
+    let using = |file: &'static str, expected: &str| {
+        told(&with(file).iter().map(String::as_str).collect::<Vec<_>>(), expected);
+    };
+    let mut bytes = std::fs::read(&learnt).expect("a file");
+    bytes[100] ^= 1;
+    std::fs::write(&other, &bytes).expect("written");
+    using("other.guide", "damaged: its checksum is wrong");
+    let run = lucerna(&["guide", "info", text(&other)]);
+    assert!(run.code == 2 && run.stderr.lines().count() == 1 && run.stderr.contains("damaged"), "{}", run.stderr);
+    std::fs::write(&other, &bytes[..bytes.len() / 2]).expect("written");
+    using("other.guide", "damaged: its checksum is wrong");
+    std::fs::write(&other, b"PNG or so").expect("written");
+    using("other.guide", "is not a file of what a guide has learnt");
+    std::fs::write(&other, b"").expect("written");
+    using("other.guide", "is not a file of what a guide has learnt");
+    using("no/such/folder.guide", "the folder does not exist");
+    let frozen = [&GUIDED[..], &["--guide-frozen", "--guide-file", "none.guide"]].concat();
+    told(&frozen, "none.guide: no such file, and nothing may be learnt");
+    told(&["--guide-file", text(&learnt)], "needs an integrator with a guide");
+    let scene = ["render", "-q", "scenes/tests/bsdfs/blendbsdf.xml", "-o", text(&output)];
+    let run = lucerna(&[&scene[..], &keeps].concat());
+    assert!(run.code == 2 && run.stderr.contains("is of another scene: its bounds are ["), "{}", run.stderr);
+}
+
+/// The same command goes on from where a run stood, here at its end; another command is refused. (What is interrupted
+/// elsewhere: `tests/determinism.rs`, `tests/guiding/kept.rs`.)
+#[test]
+fn hc_x02_the_same_command_continues_a_run() {
+    for guide in [&[][..], &GUIDED[..]] {
+        let name = format!("{}.state", guide.len());
+        let state = temporary("checkpoint", &name);
+        let whole = cornell("checkpoint", "whole.exr", &[guide, &["--spp", "20"]].concat());
+        let keeps = [guide, &["--spp", "20", "--checkpoint", text(&state), "--checkpoint-every", "0"]].concat();
+        assert_eq!(cornell("checkpoint", "kept.exr", &keeps).image.data, whole.image.data);
+        let again = cornell("checkpoint", "again.exr", &keeps);
+        assert!(again.image.data == whole.image.data && number(&again, "lucerna:spp") == 20.0);
+        let output = temporary("checkpoint", "other.exr");
+        for (more, expected) in [
+            (&["--seed", "1"][..], "its seed is 0, not 1"),
+            (&["--crop", "0,0,4,4"], "its window is 16x16 at 0,0, not 4x4 at 0,0"),
+            (&["--light-sampler", "power"], "its scene is another"),
+        ] {
+            let run = lucerna(&[&["render", "-q", "-D", "res=16", "-o", text(&output)], &keeps[..], more].concat());
+            assert!(run.code == 2 && run.stderr.contains(expected), "{expected}: {}", run.stderr);
+        }
+    }
+}

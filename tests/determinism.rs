@@ -1,11 +1,13 @@
 //! The same bits for any number of threads, in every run, and for a run that stops early.
 
-use lucerna::core::render::{Budget, Control, PassEnd, Progress, RenderContext, Report};
+use lucerna::core::render::{Budget, Checkpoint, Control, PassEnd, Progress, RenderContext, Report};
 use lucerna::core::scene::xml::{LoadOptions, load_str};
 use lucerna::core::scene::{Scene, instantiate, resolve, upgrade};
 use std::ops::ControlFlow;
+use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 
 /// The built-in scene with another filter and sampler, 40 pixels wide: three tiles a side, the last one cut.
 fn cornell(filter: &str, sampler: &str) -> Scene {
@@ -141,5 +143,37 @@ fn what_looks_at_passes_can_end_the_run_there() {
         assert!(report.stopped && report.spp == 5, "{name}: {} spp", report.spp);
         assert!(seen.lock().unwrap().iter().map(|(spp, _)| *spp).eq(1..=5), "{name}");
         assert!(samples(&scene, 1, 5) == bits, "{name}");
+    }
+}
+
+/// Interrupted inside a pass and gone on with: the picture, and what the report counts, of a run without interruption.
+#[test]
+fn hc_x02_an_interrupted_run_has_the_same_bits() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("determinism");
+    std::fs::create_dir_all(&folder).expect("a folder");
+    for (number, (name, scene)) in scenes().enumerate() {
+        let path = folder.join(format!("{number}.state"));
+        let _ = std::fs::remove_file(&path);
+        let camera = &scene.sensors()[0];
+        let integrator = scene.integrator().expect("the scene has an integrator");
+        let part = |control: &Control<'_>| {
+            let mut cx = RenderContext::new(&scene, camera, Budget::Samples(50), 1, control, Vec::new());
+            cx.checkpoint = Some(Checkpoint { path: path.clone(), every: 1e9, of: Vec::new() });
+            let report = integrator.render(&mut cx).expect("it renders");
+            let (_, data) = cx.store.develop(&cx.film);
+            (report, data.iter().map(|value| value.to_bits()).collect::<Vec<u32>>())
+        };
+        for stop in [5, 6, 17, 33].map(|spp: u64| spp * 40 * 40 + 700) {
+            let taken = AtomicU64::new(0);
+            let count = |progress: Progress| {
+                taken.fetch_max(progress.samples, Ordering::Relaxed);
+            };
+            let clock = || Duration::from_secs(u64::from(taken.load(Ordering::Relaxed) >= stop));
+            let (report, _) = part(&Control::new().with_progress(&count).with_clock(&clock).with_deadline(0.5));
+            assert!(report.stopped && report.samples > 1600 * u64::from(report.spp), "{name}: not inside a pass");
+        }
+        let (report, bits) = part(&Control::new());
+        assert!(!report.stopped && report.samples == 50 * 40 * 40, "{name}: {} samples", report.samples);
+        assert!(bits == samples(&scene, 2, 50), "{name}: another picture");
     }
 }

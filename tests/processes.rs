@@ -41,6 +41,8 @@ impl Integrator for Slow {
             order: cx.order,
             control: &control,
             store: FilmStore::new(cx.store.size(), Vec::new()),
+            checkpoint: None,
+            guide_file: None,
         };
         self.0.render(&mut again)?;
         Ok(report)

@@ -3,7 +3,9 @@
 mod check;
 mod compare;
 mod convert;
+mod guide;
 mod info;
+mod keeping;
 mod plugins;
 mod render;
 mod scene_args;
@@ -41,6 +43,8 @@ enum Command {
     Plugins(plugins::Arguments),
     /// Show what a scene holds
     Info(info::Arguments),
+    /// Show what a guide has learnt
+    Guide(guide::Arguments),
 }
 
 /// What went wrong, ready to print; the word `error:` is already in it.
@@ -69,6 +73,7 @@ pub fn run(registry: &Registry) -> ExitCode {
         Command::Convert(arguments) => convert::run(&arguments),
         Command::Plugins(arguments) => plugins::run(registry, &arguments),
         Command::Info(arguments) => info::run(registry, &arguments),
+        Command::Guide(arguments) => guide::run(registry, &arguments),
     };
     done.unwrap_or_else(|Failure(message)| {
         eprintln!("{message}");

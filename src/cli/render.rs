@@ -1,6 +1,7 @@
 //! `lucerna render`: a scene to a picture.
 
 use super::Failure;
+use super::keeping::{self, Chosen, KeepingArguments};
 use super::scene_args::{SceneArguments, default_output};
 use super::views::{MOST_SPP, Rendered, ViewArguments};
 use crate::short_form;
@@ -90,6 +91,9 @@ pub struct Arguments {
     max_memory: u64,
 
     #[command(flatten)]
+    keeping: KeepingArguments,
+
+    #[command(flatten)]
     views: ViewArguments,
 
     /// Write a summary in JSON
@@ -105,14 +109,14 @@ pub struct Arguments {
     reference_order: Option<u32>,
 }
 
-fn positive(text: &str) -> Result<f64, String> {
+pub fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds >= 0.0 && seconds.is_finite() => Ok(seconds),
         _ => Err("expected a number of seconds".to_owned()),
     }
 }
 
-fn numbers<const N: usize>(text: &str) -> Result<[u32; N], String> {
+pub fn numbers<const N: usize>(text: &str) -> Result<[u32; N], String> {
     let list: Result<Vec<u32>, _> = text.split(',').map(|part| part.trim().parse::<u32>()).collect();
     list.ok().and_then(|list| list.try_into().ok()).ok_or_else(|| format!("expected {N} whole numbers"))
 }
@@ -139,6 +143,7 @@ pub fn run(registry: &Registry, arguments: &Arguments) -> Result<ExitCode, Failu
     if arguments.pixel.is_none() {
         image::check_writable(&output).map_err(|e| Failure::new(format!("{}: {e}", output.display())))?;
     }
+    arguments.keeping.check()?;
     super::set_threads(arguments.threads)?;
     let mut description = arguments.scene.describe()?;
     if let Some(text) = &arguments.integrator {
@@ -162,6 +167,7 @@ pub fn run(registry: &Registry, arguments: &Arguments) -> Result<ExitCode, Failu
     let is_integrator = |id| description.node(id).kind == ObjectKind::Integrator;
     let chosen = description.children(description.root).map(|(_, child)| child).find(|child| is_integrator(*child));
     let name = chosen.map_or_else(String::new, |child| description.node(child).plugin.clone());
+    let hash = if arguments.keeping.keeps_state() { keeping::hash(&description)? } else { String::new() };
     let mut scene = arguments.scene.build(registry, description)?.scene;
     if arguments.reference_order.is_some() {
         scene.use_reference_offsets();
@@ -175,7 +181,7 @@ pub fn run(registry: &Registry, arguments: &Arguments) -> Result<ExitCode, Failu
         (None, spp) => Budget::Samples(camera.sampler.round_spp(spp.unwrap_or(camera.sampler.sample_count()))),
     };
     tell_rounding(arguments, budget);
-    render(arguments, &scene, &camera, (&name, &*integrator), budget, &output)
+    render(arguments, (&scene, &hash), &camera, (&name, &*integrator), budget, &output)
 }
 
 fn tell_rounding(arguments: &Arguments, budget: Budget) {
@@ -210,13 +216,18 @@ fn check_complete(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
     if missing.is_empty() { Ok(()) } else { Err(Failure(missing.join("\n"))) }
 }
 
+/// A sensor by its number.
+pub fn sensor(scene: &Scene, number: usize) -> Result<&BuiltSensor, Failure> {
+    let count = scene.sensors().len();
+    scene.sensors().get(number).ok_or_else(|| match count {
+        1 => Failure::new(format!("there is no sensor {number}: the scene has one, number 0")),
+        _ => Failure::new(format!("there is no sensor {number}: the scene has {count}, counted from 0")),
+    })
+}
+
 /// The chosen sensor, with another sampler if one is asked for.
 fn camera(registry: &Registry, scene: &Scene, arguments: &Arguments) -> Result<BuiltSensor, Failure> {
-    let count = scene.sensors().len();
-    let mut camera = scene.sensors().get(arguments.sensor).cloned().ok_or_else(|| match count {
-        1 => Failure::new(format!("there is no sensor {}: the scene has one, number 0", arguments.sensor)),
-        _ => Failure::new(format!("there is no sensor {}: the scene has {count}, counted from 0", arguments.sensor)),
-    })?;
+    let mut camera = sensor(scene, arguments.sensor)?.clone();
     if let Some(text) = &arguments.sampler {
         let node = short_form::parse(ObjectKind::Sampler, text, "--sampler").map_err(Failure::new)?;
         if let Object::Sampler(sampler) = build_one(registry, &Description::of(node))? {
@@ -228,7 +239,7 @@ fn camera(registry: &Registry, scene: &Scene, arguments: &Arguments) -> Result<B
 
 fn render(
     arguments: &Arguments,
-    scene: &Scene,
+    (scene, hash): (&Scene, &str),
     camera: &BuiltSensor,
     (name, integrator): (&str, &dyn Integrator),
     budget: Budget,
@@ -268,6 +279,8 @@ fn render(
     if let Some(threads) = arguments.reference_order {
         cx.order = SampleOrder::Reference { threads };
     }
+    let chosen = Chosen { sensor: arguments.sensor, sampler: arguments.sampler.as_deref(), seed: arguments.seed };
+    arguments.keeping.apply(&mut cx, hash, &chosen);
     if let Some([x, y]) = arguments.pixel {
         return replay_pixel(&cx, integrator, UVec2::new(x, y), arguments.sample);
     }

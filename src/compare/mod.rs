@@ -7,8 +7,8 @@
 //! **Points.** The curves have points at 1, 2, 4, … samples per pixel up to the budget. Where the sampler gives a sequence, they
 //! are looked at on the way of one run, whose clock stands still meanwhile. Samplers that stratify a number of points which they have
 //! to know at the start, and peers, render each point from the beginning; that costs about as much again as the last one. A
-//! budget in seconds becomes a number of samples per pixel, once for each method; the time that was in fact taken is what
-//! counts.
+//! budget in seconds becomes a number of samples per pixel, once for each method: from a short trial, or from a whole run by
+//! the clock where samples depend on those before. The time that was in fact taken is what counts.
 //!
 //! **Reference.** Given, or rendered until its noise does not matter ([`truth`]).
 //!
@@ -142,6 +142,12 @@ fn rate(subject: &Subject, seconds: f64) -> Result<f64, String> {
     }
 }
 
+/// Samples per pixel that fit into each time, from a run that the clock ends: what a run learns makes its samples slower or
+/// faster, and how much depends on how long it is.
+fn fit(subject: &Subject, seconds: &[f64]) -> Result<Vec<u32>, String> {
+    seconds.iter().map(|seconds| Ok(subject.counts_up_to(subject.samples_in(*seconds, u32::MAX)?))).collect()
+}
+
 /// One method in a scene, while runs are made.
 struct Contestant {
     method: Method,
@@ -163,12 +169,15 @@ fn plan(subject: &Subject, method: &Method, scene: &Path, options: &Options, sto
                 Some(known) => known,
                 None => {
                     let shortest = list.iter().copied().fold(f64::INFINITY, f64::min);
-                    let work = Work::Rate(shortest.min(2.0) / 2.0);
-                    let Answer::Rate(rate) = turn::take(subject, &turn_of(subject, method, scene, work), options)?
-                    else {
-                        return Err("its process gave no rate".to_owned());
+                    let work = match subject.learns() {
+                        true => Work::Fit(list.clone()),
+                        false => Work::Rate(shortest.min(2.0) / 2.0),
                     };
-                    let counts = counts_of_seconds(subject, list, rate);
+                    let counts = match turn::take(subject, &turn_of(subject, method, scene, work), options)? {
+                        Answer::Rate(rate) => counts_of_seconds(subject, list, rate),
+                        Answer::Fit(counts) if counts.len() == list.len() => counts,
+                        _ => return Err("its process gave no rate".to_owned()),
+                    };
                     store.keep_plan(&subject.key, &names, &counts)?;
                     counts
                 }
@@ -302,7 +311,7 @@ fn take_turns(
                 let last = shots.last().map_or_else(String::new, |s| format!("{} spp, {:.2} s", s.spp, s.seconds));
                 tell(format!("run {} of {}, {}: {last}", run + 1, options.seeds, method.name));
             }
-            Ok(Answer::Rate(_)) => *state = Err("its process gave no pictures".to_owned()),
+            Ok(_) => *state = Err("its process gave no pictures".to_owned()),
             Err(why) => {
                 tell(format!("{}: failed: {why}", method.name));
                 *state = Err(why);

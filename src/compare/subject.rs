@@ -125,8 +125,24 @@ impl Subject {
     /// Whether the picture of fewer samples can be taken from a run on its way: see [`Sampler::is_sequence`]. What learns
     /// plans for the samples it will have.
     pub fn is_sequence(&self) -> bool {
-        let learns = self.scene.integrator().is_some_and(|integrator| integrator.estimator().is_none());
-        self.peer.is_none() && !learns && self.scene.sensors()[0].sampler.is_sequence()
+        self.peer.is_none() && !self.learns() && self.scene.sensors()[0].sampler.is_sequence()
+    }
+
+    /// Whether samples depend on those before, and so does their speed.
+    pub fn learns(&self) -> bool {
+        self.peer.is_none() && self.scene.integrator().is_some_and(|integrator| integrator.estimator().is_none())
+    }
+
+    /// Samples per pixel of a run that the clock ends.
+    ///
+    /// # Errors
+    /// If the renderer gives up; one line.
+    pub fn samples_in(&self, seconds: f64, seed: u32) -> Result<u32, String> {
+        let integrator = self.scene.integrator().ok_or("the scene has no integrator")?;
+        let (camera, channels) = (&self.scene.sensors()[0], integrator.aov_names());
+        let control = Control::new().with_deadline(seconds);
+        let mut cx = RenderContext::new(&self.scene, camera, Budget::Seconds(seconds), seed, &control, channels);
+        Ok(integrator.render(&mut cx).map_err(|e| joined(&e.0))?.spp)
     }
 
     /// Renders pictures with one seed and these numbers of samples per pixel.
@@ -197,7 +213,8 @@ impl Subject {
             }
             if result.is_ok() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         };
-        let control = Control::new().with_pass_end(&look);
+        // Not looked at where that gives nothing.
+        let control = if self.is_sequence() { Control::new().with_pass_end(&look) } else { Control::new() };
         let budget = Budget::Samples(most);
         let mut cx = RenderContext::new(&self.scene, camera, budget, seed, &control, channels);
         integrator.render(&mut cx).map_err(|e| joined(&e.0))?;

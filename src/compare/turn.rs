@@ -42,6 +42,8 @@ pub enum Work {
     },
     /// Samples per pixel a second, from a trial of about so many seconds.
     Rate(f64),
+    /// Samples per pixel that fit into each of these seconds, from a run of each: what learns has no rate that lasts.
+    Fit(Vec<f64>),
 }
 
 /// A turn.
@@ -63,6 +65,8 @@ pub enum Answer {
     Shots(Vec<Shot>),
     /// Samples per pixel a second.
     Rate(f64),
+    /// Samples per pixel that fit into each time.
+    Fit(Vec<u32>),
 }
 
 /// Lines that are longer are no answer.
@@ -77,6 +81,7 @@ pub fn take(subject: &Subject, turn: &Turn, options: &Options) -> Result<Answer,
         // A peer has a process of its own anyway.
         (Place::Process { program, arguments }, _) if !subject.is_peer() => ask(program, arguments, turn),
         (_, Work::Rate(seconds)) => super::rate(subject, *seconds).map(Answer::Rate),
+        (_, Work::Fit(seconds)) => super::fit(subject, seconds).map(Answer::Fit),
         (_, Work::Render { counts, seed }) => subject.render(counts, *seed).map(Answer::Shots),
     }
 }
@@ -141,6 +146,9 @@ fn read(mut output: impl BufRead) -> Result<Answer, Option<String>> {
         if let Some(rate) = head["rate"].as_f64() {
             return Ok(Answer::Rate(rate));
         }
+        if head["fit"].is_array() {
+            return serde_json::from_value(head["fit"].clone()).map(Answer::Fit).map_err(|_| None);
+        }
         if head["end"] == true {
             let memory = head["peak_mib"].as_f64();
             shots.iter_mut().for_each(|shot| shot.memory = memory);
@@ -197,6 +205,10 @@ fn answer(
             let rate = super::rate(&subject, seconds)?;
             writeln!(output, "{}", json!({ "rate": rate })).map_err(failed)
         }
+        Work::Fit(seconds) => {
+            let counts = super::fit(&subject, &seconds)?;
+            writeln!(output, "{}", json!({ "fit": counts })).map_err(failed)
+        }
         Work::Render { counts, seed } => {
             subject.render_each(&counts, seed, true, &mut |shot| send(output, &shot).map_err(failed))?;
             writeln!(output, "{}", json!({ "end": true, "peak_mib": peak_memory() })).map_err(failed)
@@ -239,6 +251,7 @@ mod tests {
         );
         assert!(shots[0].image.data[0] == 0.5 && shots[0].image.data[1].is_nan());
         assert!(matches!(read(&b"{\"error\": \"why\"}\n"[..]), Err(Some(why)) if why == "why"));
+        assert!(matches!(read(&b"{\"fit\": [3, 9]}\n"[..]), Ok(Answer::Fit(counts)) if counts == [3, 9]));
         assert!(matches!(read(&b"nonsense"[..]), Err(None)));
     }
 }

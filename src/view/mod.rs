@@ -7,7 +7,9 @@
 //! [`Control::with_pass_end`]: lucerna_core::render::Control::with_pass_end
 
 mod bar;
+pub mod directions;
 pub mod http;
+mod letters;
 mod live;
 mod reference;
 mod summary;

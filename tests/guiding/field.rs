@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 const UNIT: Aabb = Aabb { min: Vec3::ZERO, max: Vec3::ONE };
 
-fn guide(parameters: &str) -> Arc<dyn Guide> {
+pub fn guide(parameters: &str) -> Arc<dyn Guide> {
     let text = format!("<guide version='3.0.0' type='sd_tree'>{parameters}</guide>");
     let description = load_str(&text, "guide.xml", &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
     match build_one(&lucerna::builtin(), &description) {
@@ -28,7 +28,7 @@ fn random(pcg: &mut Pcg32) -> Vec2 {
     Vec2::new(pcg.next_f32(), pcg.next_f32())
 }
 
-fn record(p: Vec3, d: Vec3, radiance: f32, pdf: f32) -> GuideRecord {
+pub fn record(p: Vec3, d: Vec3, radiance: f32, pdf: f32) -> GuideRecord {
     let kind = RecordKind::Mixed;
     GuideRecord { p, d, radiance, scattered: radiance, pdf, pdf_bsdf: pdf, pdf_guide: pdf, kind }
 }
@@ -45,7 +45,7 @@ fn light(p: Vec3, pcg: &mut Pcg32) -> GuideRecord {
     record(p, d, if d.y > 0.0 { 0.3 } else { 0.0 }, 0.5 / (4.0 * PI))
 }
 
-fn train(learner: &mut dyn GuideLearner, rounds: u32, records: usize) {
+pub fn train(learner: &mut dyn GuideLearner, rounds: u32, records: usize) {
     let mut pcg = Pcg32::new(5, 5);
     for _ in 0..rounds {
         let mut tiles = vec![Vec::new(); 4];
@@ -59,7 +59,7 @@ fn train(learner: &mut dyn GuideLearner, rounds: u32, records: usize) {
     }
 }
 
-fn hit(p: Vec3, n: Vec3) -> SurfaceHit {
+pub fn hit(p: Vec3, n: Vec3) -> SurfaceHit {
     SurfaceHit { p, n, frame: Frame::from_normal(n), wi: Vec3::Z, ..SurfaceHit::default() }
 }
 

@@ -1,10 +1,12 @@
 //! Guided paths: unbiased whatever was learnt, the same bits for any number of threads, densities that are those of the
 //! samples.
 
+mod budget;
 mod cone;
 mod corrupted;
 mod determinism;
 mod field;
+mod kept;
 mod published;
 #[path = "../support/mod.rs"]
 mod support;

@@ -1,13 +1,14 @@
 //! Guided pictures agree with those of `path`, however good or bad the guide is.
 
 use super::{SCENES, corrupted, scene};
-use crate::support::render;
+use crate::support::{render, render_with};
 use lucerna::core::image::Image;
-use lucerna::core::render::SampleOrder;
+use lucerna::core::render::{GuideFile, SampleOrder};
 use lucerna::core::stats::Measured;
 use lucerna::core::stats::chi2::sidak;
 use lucerna::core::stats::figures::measured;
 use lucerna::core::stats::images::{Scale, compare};
+use std::path::Path;
 
 /// Independent pictures of each method.
 const SEEDS: u32 = 10;
@@ -123,6 +124,34 @@ fn hc_p06_a_selection_probability_of_one_is_unbiased() {
             100.0 * blind
         ),
     );
+}
+
+/// What was learnt with the very seeds of the pictures, and is kept.
+#[test]
+fn hc_p06_guides_from_files_are_unbiased() {
+    const SPP: u32 = 64;
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("guiding").join("unbiased");
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let guide = "<guide type='sd_tree'><float name='spatial_threshold' value='200'/></guide>";
+    let scenes = [SCENES[0], SCENES[2]];
+    for (name, text) in scenes {
+        let scene = scene(text, &path(9, guide));
+        let shot = |seed: u32| {
+            let path = folder.join(format!("{name} {seed}"));
+            let with = |frozen: bool| {
+                let path = path.clone();
+                render_with(&scene, SPP, seed, |cx| cx.guide_file = Some(GuideFile { path, frozen })).0
+            };
+            with(false);
+            with(true)
+        };
+        let shots: Vec<Image> = (0..SEEDS).map(shot).collect();
+        let guided = Measured::of(&shots, &["R", "G", "B"].map(str::to_owned)).expect("ten pictures of a size");
+        let plain = pictures(text, &path(9, ""), 2 * SPP, 1000);
+        let found = compare(&guided, &plain, true, sidak(0.01, scenes.len())).expect("of a kind");
+        assert!(found.agrees(), "{name}: {:?}", found.mean_difference());
+    }
 }
 
 /// The test of the test: a guide whose density is a tenth too low makes a picture too bright.

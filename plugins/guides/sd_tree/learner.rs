@@ -22,7 +22,7 @@ use super::mixing::Mixing;
 use super::quadtree::{Quadtree, Refinement, Sums};
 use super::spatial::SpatialTree;
 use super::{DirectionalFilter, Settings, SpatialFilter};
-use lucerna_core::interfaces::{GuideField, GuideLearner, GuideRecord, mix};
+use lucerna_core::interfaces::{GuideFact, GuideField, GuideLearner, GuideRecord, mix};
 use lucerna_core::math::Aabb;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -32,27 +32,27 @@ const MOST_COARSENINGS: u32 = 10;
 
 /// The tree that is filled.
 pub struct Learner {
-    settings: Settings,
-    tree: SpatialTree,
-    cells: Vec<Cell>,
-    field: Arc<Field>,
+    pub(super) settings: Settings,
+    pub(super) tree: SpatialTree,
+    pub(super) cells: Vec<Cell>,
+    pub(super) field: Arc<Field>,
     /// Records taken in, over all iterations: what their random numbers depend on.
-    taken: u64,
-    iterations: u32,
+    pub(super) taken: u64,
+    pub(super) iterations: u32,
     /// The limit of memory was reached.
-    full: bool,
+    pub(super) full: bool,
 }
 
 /// A cell of space that is filled.
 #[derive(Clone, Default)]
-struct Cell {
-    sums: Sums,
+pub(super) struct Cell {
+    pub sums: Sums,
     /// Records, each counted by the part of it that lies here.
-    count: f64,
-    mixing: Mixing,
+    pub count: f64,
+    pub mixing: Mixing,
     /// What was learnt before.
-    directions: Option<Arc<Quadtree>>,
-    fluence: f32,
+    pub directions: Option<Arc<Quadtree>>,
+    pub fluence: f32,
 }
 
 /// A record's part in a cell: which cell, tile and record, and how much of it.
@@ -132,7 +132,7 @@ impl Learner {
     }
 
     /// Bytes of everything.
-    fn bytes(&self) -> usize {
+    pub(super) fn bytes(&self) -> usize {
         let tree = |cell: &Cell| cell.directions.as_ref().map_or(0, |tree| tree.bytes());
         let cells =
             self.cells.iter().map(|cell| size_of::<Cell>() + size_of::<Leaf>() + cell.sums.bytes() + tree(cell));
@@ -246,6 +246,14 @@ impl GuideLearner for Learner {
             lines.push("sd_tree: the limit of memory was reached, the tree is coarser than it should be".to_owned());
         }
         lines
+    }
+
+    fn save(&self) -> Vec<u8> {
+        self.pack()
+    }
+
+    fn facts(&self) -> Vec<GuideFact> {
+        self.tell()
     }
 }
 

@@ -2,6 +2,9 @@
 //! sampled and what would be ideal (Müller 2019, section 10.5).
 
 use lucerna_core::interfaces::{GuideRecord, RecordKind};
+use lucerna_core::io::limits::Cursor;
+use lucerna_core::io::sealed::Packer;
+use lucerna_core::io::{IoError, Result};
 
 /// Parameters of the descent: Kingma and Ba 2015; rate and regularisation from Müller 2019, algorithm 3.
 const RATE: f32 = 0.01;
@@ -35,6 +38,37 @@ pub struct Mixing {
 }
 
 impl Mixing {
+    /// Writes it.
+    pub fn pack(&self, to: &mut Packer) {
+        let Mixing { theta, m, v, decay_1, decay_2, steps, sum, count } = *self;
+        [theta, m, v, decay_1, decay_2].into_iter().for_each(|value| to.f32(value));
+        to.u32(steps);
+        to.f64(sum);
+        to.f64(count);
+    }
+
+    /// Reads what was written.
+    ///
+    /// # Errors
+    /// If no descent could have come there.
+    pub fn unpack(from: &mut Cursor<'_>) -> Result<Self> {
+        let mut next = || from.f32("a probability's descent");
+        let (theta, m, v, decay_1, decay_2) = (next()?, next()?, next()?, next()?, next()?);
+        let steps = from.u32("a probability's descent")?;
+        let (sum, count) = (from.f64("a probability's descent")?, from.f64("a probability's descent")?);
+        let within = |x: f32, low: f32, high: f32| (low..=high).contains(&x);
+        let usable = within(theta, -MOST, MOST)
+            && m.is_finite()
+            && within(v, 0.0, f32::MAX)
+            && within(decay_1, 0.0, 1.0)
+            && within(decay_2, 0.0, 1.0)
+            && [sum, count].into_iter().all(|x| (0.0..=f64::MAX).contains(&x));
+        match usable {
+            true => Ok(Mixing { theta, m, v, decay_1, decay_2, steps, sum, count }),
+            false => Err(IoError::new("the descent of a probability has come where it cannot")),
+        }
+    }
+
     /// Probability of the guide.
     pub fn p_guide(&self) -> f32 {
         (1.0 - self.p_bsdf()).clamp(LIMITS.0, LIMITS.1)

@@ -20,6 +20,7 @@
 //! | `nee` | string | always | when lights are sampled: `never`, `kickstart` (the first 128 samples per pixel), `always` |
 //! | `direct` | boolean | true | light that emitter sampling also finds is learnt, times the weight of finding it by scattering |
 //! | `startup` | integer | 8 | iterations of one sample per pixel before those that double |
+//! | `ending` | string | doubling | when the last iteration begins: once the one after it could not be completed (`doubling`), or, from 256 samples per pixel on, as soon as the `variance` that the rest of the budget would leave rises from one iteration to the next |
 //! | `combination` | string | inverse_variance | which iterations make the picture: the last four by `inverse_variance`, or the `last` |
 //! | `max_memory` | float | 64 | MiB that the trees may take; then they stay coarser |
 //!
@@ -40,13 +41,15 @@
 
 mod cylinder;
 mod field;
+mod kept;
 mod learner;
 mod mixing;
 mod quadtree;
 mod spatial;
 
 use learner::Learner;
-use lucerna_core::interfaces::{Combination, EmitterSampling, Guide, GuideLearner, MOST_GUIDED, Training};
+use lucerna_core::interfaces::{Combination, EmitterSampling, Ending, Guide, GuideLearner, MOST_GUIDED, Training};
+use lucerna_core::io::Result;
 use lucerna_core::math::Aabb;
 use lucerna_core::scene::{Built, Constructor, Param, Plugin, Properties};
 use std::sync::Arc;
@@ -60,7 +63,7 @@ pub const PLUGIN: Plugin = Plugin {
         Param::float("spatial_threshold", 1000.0, "records after which a cell of space is halved").at_least(1.0),
         Param::float("directional_threshold", 0.01, "part of the flux above which a cell of directions is divided")
             .range(1e-6, 1.0),
-        Param::int("directional_depth", 20, "levels of quadtrees at most").range(3.0, 20.0),
+        Param::int("directional_depth", 20, "levels of quadtrees at most").range(3.0, quadtree::MOST_LEVELS as f64),
         Param::choice("spatial_filter", &["nearest", "stochastic", "box"], "stochastic", "cells a record goes to"),
         Param::choice("directional_filter", &["nearest", "box"], "box", "directions a record goes to"),
         Param::float_opt("p_guide", "probability of the guide; learnt if unset").range(0.0, 1.0),
@@ -69,6 +72,7 @@ pub const PLUGIN: Plugin = Plugin {
         Param::choice("nee", &["never", "kickstart", "always"], "always", "when lights are sampled"),
         Param::bool("direct", true, "learns light that emitter sampling also finds, by its weight"),
         Param::int("startup", 8, "iterations of one sample per pixel at the start").range(0.0, 64.0),
+        Param::choice("ending", &["doubling", "variance"], "doubling", "when the last iteration begins"),
         Param::choice(
             "combination",
             &["inverse_variance", "last"],
@@ -129,6 +133,10 @@ fn build(p: &Properties<'_>) -> Built<dyn Guide> {
     };
     let training = Training {
         startup: number("startup"),
+        ending: match p.choice("ending") {
+            "variance" => Ending::Variance,
+            _ => Ending::Doubling,
+        },
         combination: match p.choice("combination") {
             "last" => Combination::Last,
             _ => Combination::InverseVariance,
@@ -156,5 +164,13 @@ impl Guide for SdTree {
 
     fn training(&self) -> Training {
         self.training
+    }
+
+    fn kept_as(&self) -> Option<&'static str> {
+        Some(PLUGIN.name)
+    }
+
+    fn recall(&self, bounds: Aabb, saved: &[u8]) -> Result<Box<dyn GuideLearner>> {
+        Ok(Box::new(Learner::unpack(self.settings, bounds, saved)?))
     }
 }

@@ -3,6 +3,9 @@
 //! The upper three levels are a grid of 8 × 8 that every tree has: it is sampled like a table, and may be weighted by the
 //! cosine at a vertex. Each of its cells is a leaf or the root of a quadtree.
 
+use lucerna_core::io::limits::Cursor;
+use lucerna_core::io::sealed::Packer;
+use lucerna_core::io::{IoError, Result};
 use lucerna_core::math::{ONE_MINUS_EPSILON, Vec2};
 use std::collections::VecDeque;
 use std::f32::consts::PI;
@@ -13,6 +16,9 @@ pub const EDGE: usize = 8;
 pub const CELLS: usize = EDGE * EDGE;
 /// Level of the grid's cells.
 const GRID_LEVEL: u32 = 3;
+
+/// Levels below the square at most.
+pub const MOST_LEVELS: u32 = 20;
 
 /// Nodes of a tree at most, for they are numbered with 16 bits and 0 means none.
 const MOST_NODES: usize = u16::MAX as usize;
@@ -210,6 +216,75 @@ impl Sums {
     pub fn bytes(&self) -> usize {
         size_of::<Self>() + self.nodes.len() * size_of::<Node<f64>>()
     }
+
+    /// Writes it. Between iterations all sums are 0, and not written.
+    pub fn pack(&self, to: &mut Packer) {
+        pack_shape(&self.roots, &self.nodes, to);
+        let sums = || self.grid.iter().chain(self.nodes[1..].iter().flat_map(|node| &node.value));
+        let filled = sums().any(|sum| *sum != 0.0);
+        to.u16(filled.into());
+        if filled {
+            sums().for_each(|sum| to.f64(*sum));
+        }
+    }
+
+    /// Reads what was written.
+    ///
+    /// # Errors
+    /// If it is no tree of sums.
+    pub fn unpack(from: &mut Cursor<'_>) -> Result<Self> {
+        let (roots, mut nodes) = unpack_shape(from)?;
+        let mut grid = [0.0; CELLS];
+        if from.u16("sums")? != 0 {
+            for sum in grid.iter_mut().chain(nodes[1..].iter_mut().flat_map(|node| &mut node.value)) {
+                *sum = from.f64("sums")?;
+                // Infinite sums come from infinite radiance; they are left out when the tree is refined.
+                if sum.is_nan() || *sum < 0.0 {
+                    return Err(IoError::new("a sum of flux is negative or no number"));
+                }
+            }
+        }
+        Ok(Sums { grid, roots, nodes })
+    }
+}
+
+/// Writes the shape of a tree: its roots and the children of its nodes.
+fn pack_shape<T>(roots: &[u16; CELLS], nodes: &[Node<T>], to: &mut Packer) {
+    to.u32(nodes.len() as u32 - 1);
+    roots.iter().chain(nodes[1..].iter().flat_map(|node| &node.child)).for_each(|child| to.u16(*child));
+}
+
+/// Reads the shape of a tree, in which every node stands behind the one above it and is below it once.
+///
+/// # Errors
+/// If it is none.
+fn unpack_shape<T: Copy + Default>(from: &mut Cursor<'_>) -> Result<([u16; CELLS], Vec<Node<T>>)> {
+    let count = from.count(8, "nodes of directions")?;
+    let mut levels = vec![0; count + 1];
+    let mut nodes = vec![Node::<T>::default(); count + 1];
+    let mut below = |above: usize, level: u32, levels: &mut [u32]| {
+        let child = from.u16("a node of directions")?;
+        let place = usize::from(child);
+        match levels.get_mut(place) {
+            _ if child == 0 => {}
+            Some(free) if *free == 0 && place > above && level < MOST_LEVELS => *free = level,
+            _ => return Err(IoError::new("a tree over directions is too deep or does not have every node once")),
+        }
+        Ok(child)
+    };
+    let mut roots = [0; CELLS];
+    for root in &mut roots {
+        *root = below(0, GRID_LEVEL, &mut levels)?;
+    }
+    for index in 1..=count {
+        if levels[index] == 0 || count >= MOST_NODES {
+            return Err(IoError::new("a tree over directions has too many nodes"));
+        }
+        for child in 0..4 {
+            nodes[index].child[child] = below(index, levels[index] + 1, &mut levels)?;
+        }
+    }
+    Ok((roots, nodes))
 }
 
 /// Area that a rectangle shares with a square.
@@ -292,6 +367,44 @@ impl Quadtree {
         (p.min(Vec2::splat(ONE_MINUS_EPSILON)), density)
     }
 
+    /// Writes it.
+    pub fn pack(&self, to: &mut Packer) {
+        pack_shape(&self.roots, &self.nodes, to);
+        let parts = self.grid.iter().chain(self.nodes[1..].iter().flat_map(|node| &node.value));
+        parts.for_each(|part| to.f32(*part));
+    }
+
+    /// Reads what was written.
+    ///
+    /// # Errors
+    /// If it is no tree of probabilities.
+    pub fn unpack(from: &mut Cursor<'_>) -> Result<Self> {
+        let (roots, nodes) = unpack_shape(from)?;
+        let mut tree = Quadtree { grid: [0.0; CELLS], roots, nodes };
+        for part in tree.grid.iter_mut().chain(tree.nodes[1..].iter_mut().flat_map(|node| &mut node.value)) {
+            *part = from.f32("probabilities")?;
+        }
+        tree.validate().map_err(IoError::new)?;
+        Ok(tree)
+    }
+
+    /// Leaves at each level below the square, which is level 0.
+    pub fn leaves_per_level(&self, counts: &mut [u64; MOST_LEVELS as usize + 1]) {
+        let mut levels = vec![GRID_LEVEL; self.nodes.len()];
+        let roots = self.roots.iter().filter(|root| **root == 0).count();
+        counts[GRID_LEVEL as usize] += roots as u64;
+        // A node comes after the one above it.
+        for (index, node) in self.nodes.iter().enumerate().skip(1) {
+            let level = levels[index] + 1;
+            for child in node.child {
+                match child {
+                    0 => counts[level as usize] += 1,
+                    below => levels[usize::from(below)] = level,
+                }
+            }
+        }
+    }
+
     /// Nodes below the grid.
     pub fn nodes(&self) -> usize {
         self.nodes.len() - 1
@@ -306,7 +419,7 @@ impl Quadtree {
     ///
     /// # Errors
     /// What does not hold.
-    pub fn validate(&self) -> Result<(), String> {
+    pub fn validate(&self) -> std::result::Result<(), String> {
         let is_distribution = |parts: &[f32]| {
             let sum: f32 = parts.iter().sum();
             parts.iter().all(|p| *p >= 0.0) && (sum - 1.0).abs() < 1e-4

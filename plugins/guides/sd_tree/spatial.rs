@@ -1,5 +1,8 @@
 //! A binary tree over a cube: each split halves a cell, along x, y and z in turn.
 
+use lucerna_core::io::limits::Cursor;
+use lucerna_core::io::sealed::Packer;
+use lucerna_core::io::{IoError, Result};
 use lucerna_core::math::{Aabb, Vec3};
 
 /// Set in the number of a child that is a leaf.
@@ -32,6 +35,49 @@ impl SpatialTree {
         let usable = bounds.is_finite() && !bounds.is_empty() && extent > 0.0 && (1.0 / extent).is_finite();
         let (min, scale) = if usable { (bounds.min, 1.0 / extent) } else { (Vec3::ZERO, 1.0) };
         SpatialTree { min, scale, root: LEAF, nodes: Vec::new(), leaves: 1 }
+    }
+
+    /// Writes it; bounds are not part of it.
+    pub fn pack(&self, to: &mut Packer) {
+        to.u32(self.nodes.len() as u32);
+        self.nodes.iter().flatten().for_each(|child| to.u32(*child));
+    }
+
+    /// Reads what was written of a tree over these bounds.
+    ///
+    /// # Errors
+    /// If it is not a tree, in one line.
+    pub fn unpack(from: &mut Cursor<'_>, bounds: Aabb) -> Result<Self> {
+        let wrong = |why: &str| Err(IoError::new(format!("the tree over space {why}")));
+        let count = from.count(8, "nodes of space")?;
+        let mut tree = SpatialTree::new(bounds);
+        let mut found = vec![false; count + 1];
+        let mut depths = vec![0; count];
+        tree.nodes.reserve_exact(count);
+        for index in 0..count {
+            let children = [from.u32("a node of space")?, from.u32("a node of space")?];
+            for child in children {
+                // A node comes after the one above it, so that there is an end.
+                let number = (child & !LEAF) as usize;
+                if child & LEAF != 0 {
+                    match found.get_mut(number) {
+                        Some(found) if !*found => *found = true,
+                        _ => return wrong("does not have every leaf once"),
+                    }
+                } else if number <= index || number >= count || depths[number] != 0 {
+                    return wrong("does not have every node once");
+                } else {
+                    depths[number] = depths[index] + 1;
+                }
+            }
+            if (index > 0 && depths[index] == 0) || depths[index] >= DEEPEST {
+                return wrong("is too deep or in pieces");
+            }
+            tree.nodes.push(children);
+        }
+        tree.root = if count == 0 { LEAF } else { 0 };
+        tree.leaves = count as u32 + 1;
+        Ok(tree)
     }
 
     /// The position of a point; outside it is on the edge.
@@ -154,7 +200,7 @@ impl SpatialTree {
     ///
     /// # Errors
     /// What does not hold.
-    pub fn validate(&self) -> Result<(), String> {
+    pub fn validate(&self) -> std::result::Result<(), String> {
         let leaves = self.walk();
         let numbered = leaves.iter().enumerate().all(|(i, (leaf, _))| i as u32 == *leaf);
         if !numbered || leaves.len() != self.leaves() || self.nodes.len() + 1 != leaves.len() {

@@ -9,6 +9,7 @@
 //! guide is at most [`MOST_GUIDED`], so that whatever a field has learnt, right or wrong, no light is lost.
 
 use super::{Arena, SurfaceHit};
+use crate::io::{IoError, Result};
 use crate::math::{Aabb, Vec2, Vec3};
 use std::sync::Arc;
 
@@ -22,6 +23,20 @@ pub trait Guide: Send + Sync {
 
     /// How a run learns and what it keeps.
     fn training(&self) -> Training;
+
+    /// The name of the plugin whose files of learnt state it reads and writes; `None` if it has none.
+    fn kept_as(&self) -> Option<&'static str> {
+        None
+    }
+
+    /// Somebody who knows what [`GuideLearner::save`] wrote of a scene inside the same `bounds`. The bytes may be
+    /// anything; they are checked.
+    ///
+    /// # Errors
+    /// If they are not what was written, in one line.
+    fn recall(&self, _bounds: Aabb, _saved: &[u8]) -> Result<Box<dyn GuideLearner>> {
+        Err(IoError::new("what this guide learns cannot be kept"))
+    }
 }
 
 /// How a run learns and what it keeps of its iterations.
@@ -29,6 +44,8 @@ pub trait Guide: Send + Sync {
 pub struct Training {
     /// Iterations of one sample per pixel at the start, so that the field finds out where paths go.
     pub startup: u32,
+    /// When the last iteration begins.
+    pub ending: Ending,
     /// What becomes of the pictures of the iterations.
     pub combination: Combination,
     /// When lights are sampled.
@@ -37,6 +54,16 @@ pub struct Training {
     pub learn_direct: bool,
     /// Narrower lobes than this are not guided.
     pub least_roughness: f32,
+}
+
+/// When the last iteration begins, which has all that is left of the budget.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// Once the iteration after it could not be completed.
+    Doubling,
+    /// Then, or when the variance that the rest of the budget would leave no longer falls from iteration to iteration
+    /// (Müller, Gross, Novák 2017, section 5).
+    Variance,
 }
 
 /// What becomes of the pictures of the iterations.
@@ -72,6 +99,38 @@ pub trait GuideLearner: Send {
 
     /// What it holds, for the report: a few words per item.
     fn summary(&self) -> Vec<String>;
+
+    /// All it knows, to the bit, for [`Guide::recall`].
+    fn save(&self) -> Vec<u8> {
+        Vec::new()
+    }
+
+    /// What it holds, in numbers.
+    fn facts(&self) -> Vec<GuideFact> {
+        Vec::new()
+    }
+}
+
+/// Something that can be told of what was learnt.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GuideFact {
+    /// Its name, in words of lower case.
+    pub name: &'static str,
+    /// How much.
+    pub value: FactValue,
+}
+
+/// A number or several.
+#[derive(Clone, Debug, PartialEq)]
+pub enum FactValue {
+    /// A number of things.
+    Count(u64),
+    /// A number.
+    Number(f64),
+    /// The least and the largest.
+    Range([f64; 2]),
+    /// Numbers of things at depth 0, 1, 2, …
+    PerDepth(Vec<u64>),
 }
 
 /// What has been learnt.
@@ -87,7 +146,7 @@ pub trait GuideField: Send + Sync {
     ///
     /// # Errors
     /// What does not hold.
-    fn validate(&self) -> Result<(), String>;
+    fn validate(&self) -> std::result::Result<(), String>;
 }
 
 /// The directions learnt at a vertex.

@@ -31,8 +31,8 @@ pub use bsdf::{Arena, Bsdf, Bxdf, BxdfSample, Lobes, Transport};
 pub use emitter::{Emitter, EmitterFlags, LightBounds, LightPoint, LightSample};
 pub use film::{ComponentFormat, FileFormat, Film, FilmSettings, PixelFormat};
 pub use guide::{
-    Combination, EmitterSampling, Guide, GuideField, GuideLearner, GuideRecord, GuidedDirections, MOST_GUIDED,
-    RecordKind, Training,
+    Combination, EmitterSampling, Ending, FactValue, Guide, GuideFact, GuideField, GuideLearner, GuideRecord,
+    GuidedDirections, MOST_GUIDED, RecordKind, Training,
 };
 pub use integrator::{Integrator, Radiance, RadianceEstimator};
 pub use light_sampler::{Light, LightSampler, LightSelection, LightVertex, long_number};

@@ -107,6 +107,85 @@ impl<'a> Cursor<'a> {
         array.copy_from_slice(self.take(N, what)?);
         Ok(array)
     }
+
+    /// The next number, little-endian.
+    ///
+    /// # Errors
+    /// If the file ends before.
+    pub fn u16(&mut self, what: &str) -> Result<u16> {
+        self.array(what).map(u16::from_le_bytes)
+    }
+
+    /// As [`u16`](Self::u16).
+    ///
+    /// # Errors
+    /// If the file ends before.
+    pub fn u32(&mut self, what: &str) -> Result<u32> {
+        self.array(what).map(u32::from_le_bytes)
+    }
+
+    /// As [`u16`](Self::u16).
+    ///
+    /// # Errors
+    /// If the file ends before.
+    pub fn u64(&mut self, what: &str) -> Result<u64> {
+        self.array(what).map(u64::from_le_bytes)
+    }
+
+    /// As [`u16`](Self::u16); it may be infinite or no number.
+    ///
+    /// # Errors
+    /// If the file ends before.
+    pub fn f32(&mut self, what: &str) -> Result<f32> {
+        self.array(what).map(f32::from_le_bytes)
+    }
+
+    /// As [`u16`](Self::u16); it may be infinite or no number.
+    ///
+    /// # Errors
+    /// If the file ends before.
+    pub fn f64(&mut self, what: &str) -> Result<f64> {
+        self.array(what).map(f64::from_le_bytes)
+    }
+
+    /// Bytes with their number before them.
+    ///
+    /// # Errors
+    /// If fewer are left.
+    pub fn block(&mut self, what: &str) -> Result<&'a [u8]> {
+        let length = self.u64(what)?;
+        let length = declared(length, 1, self.rest().len(), "bytes")?;
+        self.take(length, what)
+    }
+
+    /// Text with its length before it.
+    ///
+    /// # Errors
+    /// If it is cut short or no UTF-8.
+    pub fn text(&mut self, what: &str) -> Result<String> {
+        let bytes = self.block(what)?;
+        String::from_utf8(bytes.to_vec()).map_err(|_| IoError::new(format!("{what} is no text")))
+    }
+
+    /// A number of things, of which each takes `bytes_each` of what is left at least.
+    ///
+    /// # Errors
+    /// If they cannot be there.
+    pub fn count(&mut self, bytes_each: u64, what: &str) -> Result<usize> {
+        let count = self.u32(what)?;
+        declared(count.into(), bytes_each, self.rest().len(), what)
+    }
+
+    /// Checks that nothing is left.
+    ///
+    /// # Errors
+    /// If something is.
+    pub fn end(&self) -> Result<()> {
+        match self.rest().len() {
+            0 => Ok(()),
+            left => Err(IoError::new(format!("{left} bytes are left over at the end"))),
+        }
+    }
 }
 
 #[cfg(test)]

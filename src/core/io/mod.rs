@@ -10,6 +10,7 @@ mod mesh;
 pub mod obj;
 pub mod output;
 pub mod ply;
+pub mod sealed;
 pub mod serialized;
 pub mod vol;
 

@@ -9,6 +9,9 @@
 
 use super::FilmStore;
 use crate::interfaces::{Combination, Radiance};
+use crate::io::Result;
+use crate::io::limits::Cursor;
+use crate::io::sealed::Packer;
 use crate::math::UVec2;
 use glam::IVec2;
 use std::collections::VecDeque;
@@ -138,6 +141,12 @@ impl Iterations {
         }
     }
 
+    /// Mean variance of one sample of the latest iteration, if it is known.
+    pub fn variance(&self) -> Option<f64> {
+        let [even, odd] = self.kept.back()?.variances()?;
+        Some(0.5 * (even + odd))
+    }
+
     /// Weights of the iterations' means in both halves; they sum to 1.
     fn weights(&self) -> Vec<[f64; 2]> {
         let sampled: Vec<&Iteration> = self.kept.iter().collect();
@@ -168,6 +177,33 @@ impl Iterations {
             *weight = [0, 1].map(|half: usize| if sums[half] > 0.0 { weight[half] / sums[half] } else { 0.0 });
         }
         weights
+    }
+
+    /// Writes all that counts.
+    pub fn pack(&self, to: &mut Packer) {
+        to.u32(self.kept.len() as u32);
+        for Iteration { store, spp, moments } in &self.kept {
+            to.u32(*spp);
+            store.pack(to);
+            moments.iter().flatten().for_each(|moment| to.f64(*moment));
+        }
+    }
+
+    /// Reads what was written of pictures like these.
+    ///
+    /// # Errors
+    /// If they are of another size.
+    pub fn unpack(&mut self, from: &mut Cursor<'_>) -> Result<()> {
+        self.kept.clear();
+        for _ in 0..from.count(12, "iterations")? {
+            let spp = from.u32("an iteration")?;
+            let mut iteration = Iteration { spp, store: self.empty.store.unpack(from)?, ..self.empty.clone() };
+            for moment in iteration.moments.iter_mut().flatten() {
+                *moment = from.f64("moments of an iteration")?;
+            }
+            self.kept.push_back(iteration);
+        }
+        Ok(())
     }
 
     /// All that counts as one film.

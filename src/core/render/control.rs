@@ -3,6 +3,7 @@
 use super::FilmStore;
 use crate::image::Image;
 use crate::interfaces::FilmSettings;
+use std::borrow::Borrow;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -68,10 +69,15 @@ impl PassEnd<'_> {
 /// Looks at the picture between passes, and may end the run.
 pub type OnPass<'a> = &'a (dyn Fn(PassEnd<'_>) -> ControlFlow<()> + Sync);
 
+/// Tells the time since some moment.
+pub type Clock<'a> = &'a (dyn Fn() -> Duration + Sync);
+
 /// Stop button, deadline and progress of a run.
 pub struct Control<'a> {
     stop: AtomicBool,
     started: Instant,
+    /// Another clock than the system's, which shows 0 at the start.
+    clock: Option<Clock<'a>>,
     /// Nanoseconds that were not spent on rendering.
     aside: AtomicU64,
     limit: Option<Duration>,
@@ -84,6 +90,7 @@ impl Default for Control<'_> {
         Control {
             stop: AtomicBool::new(false),
             started: Instant::now(),
+            clock: None,
             aside: AtomicU64::new(0),
             limit: None,
             on_progress: None,
@@ -102,6 +109,12 @@ impl<'a> Control<'a> {
     pub fn with_deadline(mut self, seconds: f64) -> Self {
         // More than a century is no deadline (and would overflow the clock).
         self.limit = (seconds < 3.2e9).then(|| Duration::from_secs_f64(seconds.max(0.0)));
+        self
+    }
+
+    /// Goes by another clock, which shows 0 at the start: for tests that no machine's speed may decide.
+    pub fn with_clock(mut self, clock: Clock<'a>) -> Self {
+        self.clock = Some(clock);
         self
     }
 
@@ -143,22 +156,37 @@ impl<'a> Control<'a> {
         Some(if total > 0.0 { (self.seconds() / total).min(1.0) } else { 1.0 })
     }
 
+    /// Seconds of rendering until the deadline, if there is one.
+    pub fn seconds_left(&self) -> Option<f64> {
+        Some(self.limit?.saturating_sub(self.rendering()).as_secs_f64())
+    }
+
+    fn elapsed(&self) -> Duration {
+        self.clock.map_or_else(|| self.started.elapsed(), |clock| clock())
+    }
+
     fn rendering(&self) -> Duration {
-        self.started.elapsed().saturating_sub(Duration::from_nanos(self.aside.load(Ordering::Relaxed)))
+        self.elapsed().saturating_sub(Duration::from_nanos(self.aside.load(Ordering::Relaxed)))
     }
 
-    /// Whether anybody looks at the picture between passes.
-    pub(crate) fn watches_passes(&self) -> bool {
-        self.on_pass.is_some()
-    }
-
-    /// To be called between passes.
-    pub(crate) fn end_pass(&self, spp: u32, film: &FilmSettings, store: &FilmStore) -> ControlFlow<()> {
+    /// To be called between passes. `store` gives the film so far, if anybody looks at it; its time does not count.
+    pub(crate) fn end_pass<S: Borrow<FilmStore>>(
+        &self,
+        spp: u32,
+        film: &FilmSettings,
+        store: impl FnOnce() -> S,
+    ) -> ControlFlow<()> {
         let Some(on_pass) = self.on_pass else { return ControlFlow::Continue(()) };
-        let (seconds, began) = (self.seconds(), Instant::now());
-        let flow = on_pass(PassEnd { spp, seconds, film, store });
-        self.aside.fetch_add(began.elapsed().as_nanos() as u64, Ordering::Relaxed);
-        flow
+        let seconds = self.seconds();
+        self.aside(|| on_pass(PassEnd { spp, seconds, film, store: store().borrow() }))
+    }
+
+    /// Does something that does not count as rendering, between passes.
+    pub(crate) fn aside<T>(&self, work: impl FnOnce() -> T) -> T {
+        let began = self.elapsed();
+        let done = work();
+        self.aside.fetch_add(self.elapsed().saturating_sub(began).as_nanos() as u64, Ordering::Relaxed);
+        done
     }
 
     pub(crate) fn progress(&self, progress: Progress) {

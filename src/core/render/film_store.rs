@@ -44,6 +44,16 @@ impl FilmStore {
         &self.aovs
     }
 
+    /// All sums.
+    pub(super) fn sums(&self) -> &[f64] {
+        &self.sums
+    }
+
+    /// All sums, to be written over.
+    pub(super) fn sums_mut(&mut self) -> &mut [f64] {
+        &mut self.sums
+    }
+
     fn stride(&self) -> usize {
         FIXED + self.aovs.len()
     }

@@ -5,18 +5,23 @@
 //! threads, and a run that stops early has the bits of a run that was asked for that many samples.
 
 mod bad_samples;
+mod checkpoint;
 mod combine;
 mod control;
 mod film_store;
+mod learnt;
 mod notebook;
 mod reference_order;
+mod standing;
 mod tabulated_filter;
 mod tiles;
 mod training;
 
 pub use bad_samples::{BadSample, BadSamples};
-pub use control::{Budget, Control, OnPass, PassEnd, Progress, Schedule};
+pub use checkpoint::Checkpoint;
+pub use control::{Budget, Clock, Control, OnPass, PassEnd, Progress, Schedule};
 pub use film_store::FilmStore;
+pub use learnt::{GuideFile, Learnt};
 pub use notebook::{Notebook, Scattering};
 pub use reference_order::ReferenceOrder;
 pub use tiles::{render_estimator, replay};
@@ -63,6 +68,10 @@ pub struct RenderContext<'a> {
     pub control: &'a Control<'a>,
     /// Where the samples go.
     pub store: FilmStore,
+    /// Where the state of the run is kept, if it is.
+    pub checkpoint: Option<Checkpoint>,
+    /// Where a guide keeps what it learns, if it does.
+    pub guide_file: Option<GuideFile>,
 }
 
 impl<'a> RenderContext<'a> {
@@ -93,7 +102,9 @@ impl<'a> RenderContext<'a> {
         let store = FilmStore::new(crop_size, aovs);
         let seed = seed.wrapping_add(camera.sampler.seed());
         let (sensor, sampler) = (&*camera.sensor, &*camera.sampler);
-        RenderContext { scene, sensor, film, sampler, budget, seed, order: SampleOrder::PerSample, control, store }
+        let order = SampleOrder::PerSample;
+        let (checkpoint, guide_file) = (None, None);
+        RenderContext { scene, sensor, film, sampler, budget, seed, order, control, store, checkpoint, guide_file }
     }
 
     /// The picture as it is now.
@@ -156,6 +167,13 @@ pub struct Report {
     pub notes: Vec<String>,
     /// The user or the clock stopped it before the asked number of samples.
     pub stopped: bool,
+}
+
+impl Report {
+    /// Adds a note, if there is one that is new.
+    fn tell_once(&mut self, note: Option<String>) {
+        self.notes.extend(note.filter(|note| !self.notes.contains(note)));
+    }
 }
 
 /// Why nothing could be rendered.

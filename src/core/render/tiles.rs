@@ -1,12 +1,14 @@
 //! The loop over passes, tiles, pixels and samples that all forward estimators share, also those that learn
 //! ([`super::training`]).
 
+use super::checkpoint::Keeper;
 use super::film_store::TileStore;
 use super::{
     BadSample, BadSamples, Budget, FilmStore, Progress, ReferenceOrder, RenderContext, RenderError, Report,
     SampleOrder, Schedule, Window,
 };
 use crate::interfaces::{Arena, CameraRay, Radiance, RadianceEstimator, stream};
+use crate::io::limits::Cursor;
 use crate::math::{UVec2, Vec2};
 use crate::sampling::{PointSet, Stream};
 use crate::scene::Scene;
@@ -78,7 +80,13 @@ impl Tracer for &dyn RadianceEstimator {
 }
 
 /// Renders an estimator into the context's film until the budget is spent.
+///
+/// # Errors
+/// If the context asks for what cannot be had, or its checkpoint is of another run.
 pub fn render_estimator(cx: &mut RenderContext<'_>, estimator: &dyn RadianceEstimator) -> Result<Report, RenderError> {
+    if cx.guide_file.is_some() {
+        return Err(RenderError("a file of what a guide has learnt needs an integrator with a guide".to_owned()));
+    }
     let prepared = estimator.prepare(cx.scene);
     let estimator = prepared.as_deref().unwrap_or(estimator);
     let asked = asked_spp(cx);
@@ -146,37 +154,63 @@ impl<'r, 'a> Run<'r, 'a> {
 
     fn passes(&self, tracer: &impl Tracer) -> Result<(Report, FilmStore), RenderError> {
         let cx = self.cx;
-        let mut store = cx.store.clone();
-        let mut report = Report::default();
+        let keeper = Keeper::of(cx)?;
+        let read = |from: &mut Cursor<'_>| Ok((Report::unpack(from, self.asked)?, cx.store.unpack(from)?));
+        let kept = keeper.as_ref().map(|keeper| keeper.resume(read)).transpose()?.flatten();
+        let (mut report, mut store) = kept.unwrap_or_else(|| (Report::default(), cx.store.clone()));
+        self.goes_on(&report);
+        let earlier = report.seconds;
+        let keep = |keeper: &Keeper<'_>, report: &Report, store: &FilmStore| {
+            keeper.write(report.spp, |seconds, to| {
+                report.pack(earlier + seconds, to);
+                store.pack(to);
+            })
+        };
+        // As of the end of the latest pass.
+        let mut complete = report.clone();
         let in_one_pass = matches!(cx.order, SampleOrder::Reference { .. });
-        for pass in 0.. {
-            let (start, end) = match in_one_pass {
-                true => (report.spp, self.asked),
-                false => Schedule::pass(pass),
-            };
-            let end = end.min(self.asked);
-            if start >= end || (pass > 0 && cx.control.should_stop()) {
+        let mut pass = 0;
+        loop {
+            while !in_one_pass && Schedule::pass(pass).1 <= report.spp {
+                pass += 1;
+            }
+            let start = report.spp;
+            let end = if in_one_pass { self.asked } else { Schedule::pass(pass).1.min(self.asked) };
+            if start >= end || (start > 0 && cx.control.should_stop()) {
                 break;
             }
             // A pass that is cut short is lost, so that the picture is that of so many samples; but for the first one.
-            let before = (report.spp > 0).then(|| store.clone());
+            let before = (start > 0).then(|| store.clone());
             if !self.pass(tracer, (start, end), BATCH, &mut store, &mut report, |_| ()) {
                 store = before.unwrap_or(store);
                 break;
             }
             report.spp = end;
-            if cx.control.end_pass(end, &cx.film, &store).is_break() {
+            complete = report.clone();
+            let flow = cx.control.end_pass(end, &cx.film, || &store);
+            if let Some(keeper) = keeper.as_ref().filter(|keeper| keeper.is_due()) {
+                report.tell_once(keep(keeper, &complete, &store));
+            }
+            if flow.is_break() {
                 break;
             }
         }
-        self.conclude(&mut report);
+        if let Some(keeper) = keeper.as_ref().filter(|keeper| keeper.is_behind(complete.spp)) {
+            report.tell_once(keep(keeper, &complete, &store));
+        }
+        self.conclude(&mut report, earlier);
         Ok((report, store))
     }
 
-    /// Writes the end of the run into the report.
-    pub(super) fn conclude(&self, report: &mut Report) {
+    /// Samples were taken in an earlier part of the run.
+    pub(super) fn goes_on(&self, from: &Report) {
+        self.taken.store(from.samples, Ordering::Relaxed);
+    }
+
+    /// Writes the end of the run into the report; so many seconds were spent in earlier parts of it.
+    pub(super) fn conclude(&self, report: &mut Report, earlier: f64) {
         report.stopped = report.spp < self.asked && matches!(self.cx.budget, Budget::Samples(_));
-        report.seconds = self.cx.control.seconds();
+        report.seconds = earlier + self.cx.control.seconds();
     }
 
     /// Takes samples `start..end` of all pixels into the film. What tiles note is handed over in their order, `batch`

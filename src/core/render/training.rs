@@ -4,14 +4,17 @@
 //! they find; what a field gives does not change meanwhile. So every picture is unbiased, and has the same bits for any
 //! number of threads. First come some iterations of one sample per pixel, by which the field learns where paths go at
 //! all; then each has twice the samples of the one before. The last one takes all that is left of the budget, once the
-//! one after it could not be completed, and notes nothing (Müller, Gross, Novák 2017, section 5; Müller 2019, sections
+//! one after it could not be completed (or learning more no longer pays: [`Ending`]), and notes nothing, unless what is
+//! learnt is kept (Müller, Gross, Novák 2017, section 5; Müller 2019, sections
 //! 10.2 and 10.7). How the pictures become one: [`super::combine`].
 
-use super::combine::{Iterations, Moments};
+use super::checkpoint::Keeper;
+use super::combine::Moments;
 use super::notebook::Notebook;
+use super::standing::{Course, Part, Standing};
 use super::tiles::{Run, Tracer, asked_spp, points};
-use super::{Budget, RenderContext, RenderError, Report, SampleOrder};
-use crate::interfaces::{Arena, CameraRay, EmitterSampling, Guide, GuideField, GuideLearner, Radiance, Training};
+use super::{Budget, Learnt, RenderContext, RenderError, Report, SampleOrder};
+use crate::interfaces::{Arena, CameraRay, EmitterSampling, Ending, Guide, GuideField, Radiance, Training};
 use crate::sampling::Stream;
 use crate::scene::Scene;
 use glam::IVec2;
@@ -25,6 +28,9 @@ const LONGEST_PASS: u32 = 16;
 
 /// Samples per pixel until which lights are sampled if that is for a start only (the default of the public code).
 const KICKSTART: u32 = 128;
+
+/// Samples per pixel from which an extrapolated variance is believed.
+const BELIEVED: u32 = 256;
 
 /// What holds during a pass.
 #[derive(Clone, Copy)]
@@ -58,7 +64,7 @@ pub trait GuidedEstimator: Sync {
 /// Renders a guided estimator into the context's film until the budget is spent, and gives what was learnt.
 ///
 /// # Errors
-/// If the context asks for what a run with learning cannot do.
+/// If the context asks for what a run with learning cannot do, or a file that it names is of another run or scene.
 pub fn render_guided(
     cx: &mut RenderContext<'_>,
     estimator: &dyn GuidedEstimator,
@@ -67,16 +73,35 @@ pub fn render_guided(
     if cx.order != SampleOrder::PerSample {
         return Err(RenderError("random numbers in the reference's order and a guide exclude each other".to_owned()));
     }
+    if cx.checkpoint.is_some() && guide.kept_as().is_none() {
+        return Err(RenderError("what this guide learns cannot be kept in a checkpoint".to_owned()));
+    }
     let asked = asked_spp(cx);
+    let keeper = Keeper::of(cx)?;
+    let resume = |keeper: &Keeper<'_>| keeper.resume(|from| Standing::unpack(from, cx, guide, asked));
+    let at = match keeper.as_ref().map(resume).transpose()?.flatten() {
+        Some(at) => at,
+        None => Standing::begin(cx, guide)?,
+    };
+    cx.seed = at.course.seed;
     let points = points(cx, asked);
     let run = Run::new(cx, points.as_deref(), asked);
-    let learner = guide.start(cx.scene.accel().bounds());
-    let mut lesson = Lesson { cx, run, estimator, training: guide.training(), learner, report: Report::default() };
-    let film = lesson.iterations(asked);
-    let Lesson { run, mut report, learner, .. } = lesson;
-    run.conclude(&mut report);
-    report.notes = learner.summary();
-    cx.store.add(&film);
+    run.goes_on(&at.report);
+    let (training, earlier) = (guide.training(), at.report.seconds);
+    let mut lesson = Lesson { cx, run, estimator, training, keeper, at, asked, earlier, pace: 0.0, snapshot: None };
+    lesson.iterations();
+    let Lesson { run, at, .. } = lesson;
+    let Standing { course, mut report, pictures, learner } = at;
+    run.conclude(&mut report, earlier);
+    report.notes.splice(0..0, learner.summary());
+    if let (Some(file), Some(name)) = (&cx.guide_file, guide.kept_as())
+        && !file.frozen
+        && (course.taught || (report.spp > 0 && !file.path.exists()))
+    {
+        let bounds = cx.scene.accel().bounds();
+        Learnt { guide: name.to_owned(), bounds, spp: course.reach, state: learner.save() }.write(&file.path)?;
+    }
+    cx.store.add(&pictures.combined());
     Ok((report, learner.field()))
 }
 
@@ -86,89 +111,159 @@ struct Lesson<'r, 'a> {
     run: Run<'r, 'a>,
     estimator: &'r dyn GuidedEstimator,
     training: Training,
-    learner: Box<dyn GuideLearner>,
-    report: Report,
+    keeper: Option<Keeper<'a>>,
+    at: Standing,
+    /// Samples per pixel of the whole run.
+    asked: u32,
+    /// Seconds of earlier parts of the run.
+    earlier: f64,
+    /// Seconds that a sample per pixel took in the latest pass; 0 before.
+    pace: f64,
+    /// What was known before the pass under way, if it is to be kept.
+    snapshot: Option<Vec<u8>>,
 }
 
 impl Lesson<'_, '_> {
-    fn iterations(&mut self, asked: u32) -> super::FilmStore {
-        let empty = super::FilmStore::new(self.cx.store.size(), self.cx.store.aovs().to_vec());
-        let mut pictures = Iterations::new(&empty, self.training.combination);
-        let mut pace = 0.0;
-        for index in 0.. {
-            let startup = index < self.training.startup;
-            let wanted = if startup { 1 } else { 1_u32 << (index - self.training.startup).min(30) };
-            let left = self.samples_left(asked, pace);
-            // The one after it would not be completed: this one is the last, and as long as can be.
-            let last = !startup && wanted.saturating_mul(3) > left;
-            let size = if last { asked - self.report.spp } else { wanted.min(asked - self.report.spp) };
-            if size == 0 || (index > 0 && self.cx.control.should_stop()) {
-                break;
+    fn iterations(&mut self) {
+        loop {
+            let index = self.at.course.index;
+            // A run that goes on is inside an iteration.
+            let part = match self.at.course.part {
+                Some(part) => part,
+                None => {
+                    let Some(part) = self.part() else { return };
+                    // The first ones share a picture, for one sample has no variance.
+                    if index == 0 || !part.startup {
+                        self.at.pictures.begin();
+                    }
+                    part
+                }
+            };
+            self.at.course.part = Some(part);
+            let (seconds, spp) = (self.cx.control.seconds(), self.at.report.spp);
+            let complete = self.iteration(part);
+            if complete && (!part.startup || index + 1 == self.at.course.startup) {
+                self.at.pictures.complete();
             }
-            // The first ones share a picture, for one sample has no variance.
-            if index == 0 || !startup {
-                pictures.begin();
+            // The last one may be over early, by the clock.
+            let (done, now) = (self.at.report.spp - part.spp.0, self.at.report.spp - spp);
+            if part.learning && done >= part.wanted {
+                self.at.learner.refine(done);
+                self.at.course.taught = true;
+                self.at.course.reach = self.at.course.reach.max(done);
             }
-            let (before, spp_before) = (self.cx.control.seconds(), self.report.spp);
-            let learning = !last && self.report.spp + size < asked;
-            if !self.iteration(&mut pictures, size, learning) {
-                break;
+            if !complete {
+                return;
             }
-            if !startup || index + 1 == self.training.startup {
-                pictures.complete();
+            let pace = (self.cx.control.seconds() - seconds) / f64::from(now.max(1));
+            self.at.course = Course { index: index + 1, part: None, pace, ..self.at.course };
+            if !part.startup {
+                self.expect(pace);
             }
-            if learning {
-                self.learner.refine(size);
-            }
-            let done = f64::from(self.report.spp - spp_before);
-            pace = (self.cx.control.seconds() - before) / done;
-        }
-        pictures.combined()
-    }
-
-    /// Samples per pixel that the budget still allows, about.
-    fn samples_left(&self, asked: u32, pace: f64) -> u32 {
-        let left = asked - self.report.spp;
-        match (self.cx.budget, self.cx.control.time_fraction()) {
-            (Budget::Seconds(_), Some(fraction)) if fraction > 0.0 && pace > 0.0 => {
-                let seconds = self.cx.control.seconds() * (1.0 / fraction - 1.0);
-                left.min((seconds / pace) as u32)
-            }
-            _ => left,
         }
     }
 
-    /// Takes so many samples per pixel. Whether they are complete and the run is to go on.
-    fn iteration(&mut self, pictures: &mut Iterations, size: u32, learning: bool) -> bool {
-        let end = self.report.spp.saturating_add(size);
-        while self.report.spp < end {
-            let start = self.report.spp;
-            if start > 0 && self.cx.control.should_stop() {
+    /// Extrapolates the variance of the picture from the latest iteration, and judges by that if it is to be.
+    fn expect(&mut self, pace: f64) {
+        let left = f64::from(self.samples_left(pace));
+        let expected = self.at.pictures.variance().map_or(f64::INFINITY, |variance| variance / left);
+        let rises = expected > self.at.course.expected && self.at.report.spp >= BELIEVED;
+        self.at.course.enough |= rises && self.training.ending == Ending::Variance;
+        self.at.course.expected = expected;
+    }
+
+    /// The next iteration, if there is to be one.
+    fn part(&self) -> Option<Part> {
+        let Course { startup, first, index, pace, .. } = self.at.course;
+        let file = self.cx.guide_file.as_ref();
+        let (frozen, keeps) = (file.is_some_and(|file| file.frozen), file.is_some_and(|file| !file.frozen));
+        let is_startup = index < startup;
+        let wanted = if is_startup { 1 } else { first.saturating_mul(1 << (index - startup).min(30)) };
+        let enough = frozen || self.at.course.enough;
+        let (begin, left) = (self.at.report.spp, self.asked - self.at.report.spp);
+        let likely = self.samples_left(pace);
+        // The one after it would not be completed: this one is the last, and as long as can be.
+        let last = enough || (!is_startup && wanted.saturating_mul(3) > likely);
+        let size = if last { left } else { wanted.min(left) };
+        // Nobody learns from the last one, unless what was learnt is kept.
+        let learning = if last || size == left { keeps && wanted <= likely } else { true };
+        (size > 0).then_some(Part { startup: is_startup, spp: (begin, begin + size), wanted, learning })
+    }
+
+    /// Samples per pixel that the budget still allows, about, at so many seconds each.
+    fn samples_left(&self, pace: f64) -> u32 {
+        let left = self.asked - self.at.report.spp;
+        self.samples_in_time(pace).map_or(left, |samples| left.min(samples))
+    }
+
+    /// Samples per pixel until the time of the budget is over, if it is one of time and the pace is known.
+    fn samples_in_time(&self, pace: f64) -> Option<u32> {
+        let is_time = matches!(self.cx.budget, Budget::Seconds(_)) && pace > 0.0;
+        let seconds = self.cx.control.seconds_left().filter(|_| is_time)?;
+        Some((seconds / pace) as u32)
+    }
+
+    /// Where a pass ends that begins now. One that the deadline cuts short is lost: towards the end, passes take half of
+    /// the time that is left, so that no more than a sample per pixel is.
+    fn pass_end(&self, part: Part) -> u32 {
+        let start = self.at.report.spp;
+        let most = self.samples_in_time(self.pace).map_or(LONGEST_PASS, |samples| (samples / 2).max(1));
+        start + (start / 8).clamp(1, LONGEST_PASS).min(most).min(part.spp.1 - start)
+    }
+
+    /// Takes the samples of an iteration. Whether they are complete and the run is to go on.
+    fn iteration(&mut self, part: Part) -> bool {
+        while self.at.report.spp < part.spp.1 {
+            let (start, control) = (self.at.report.spp, self.cx.control);
+            let before = self.at.report.clone();
+            if start > 0 && control.should_stop() {
+                self.keep(&before, true);
                 return false;
             }
-            let next = start + (start / 8).clamp(1, LONGEST_PASS).min(end - start);
-            if !self.pass(pictures, (start, next), learning) {
+            let (next, began) = (self.pass_end(part), control.seconds());
+            if self.keeper.is_some() && part.learning {
+                self.snapshot = Some(self.at.learner.save());
+            }
+            if !self.pass((start, next), part.learning) {
+                self.keep(&before, true);
                 return false;
             }
-            let control = self.cx.control;
-            if control.watches_passes() && control.end_pass(next, &self.cx.film, &pictures.combined()).is_break() {
+            self.snapshot = None;
+            self.pace = (control.seconds() - began) / f64::from(next - start);
+            let flow = control.end_pass(next, &self.cx.film, || self.at.pictures.combined());
+            self.keep(&self.at.report.clone(), flow.is_break() || next == self.asked);
+            if flow.is_break() {
                 return false;
             }
         }
         true
     }
 
+    /// Keeps the state of the run at the end of the latest pass, with what the report was then: if it is time to, or
+    /// the run is over.
+    fn keep(&mut self, report: &Report, is_over: bool) {
+        let Some(keeper) = &self.keeper else { return };
+        let wanted = if is_over { keeper.is_behind(report.spp) } else { keeper.is_due() };
+        if wanted {
+            let learner = self.snapshot.take().unwrap_or_else(|| self.at.learner.save());
+            let note = keeper.write(report.spp, |seconds, to| {
+                self.at.pack(&learner, report, self.earlier + seconds, to);
+            });
+            self.at.report.tell_once(note);
+        }
+    }
+
     /// One pass; one that is cut short is lost, but for the first.
-    fn pass(&mut self, pictures: &mut Iterations, (start, end): (u32, u32), learning: bool) -> bool {
-        let mut film = pictures.film();
+    fn pass(&mut self, (start, end): (u32, u32), learning: bool) -> bool {
+        let mut film = self.at.pictures.film();
         let mut moments = Vec::new();
         let sample_emitters = match self.training.emitter_sampling {
             EmitterSampling::Never => false,
-            EmitterSampling::Kickstart => start < KICKSTART,
+            EmitterSampling::Kickstart => start < KICKSTART && self.at.course.first == 1,
             EmitterSampling::Always => true,
         };
         let Training { learn_direct, least_roughness, .. } = self.training;
-        let (field, learner) = (self.learner.field(), &mut self.learner);
+        let (field, learner) = (self.at.learner.field(), &mut self.at.learner);
         let guidance = Guidance { field: &*field, sample_emitters, learning, least_roughness };
         let guided = Guided { estimator: self.estimator, guidance, learn_direct };
         // Notes are taken in as they come, so that those of a few tiles at most are held. A pass that is lost afterwards
@@ -182,12 +277,12 @@ impl Lesson<'_, '_> {
             }
             moments.extend(found);
         };
-        let complete = self.run.pass(&guided, (start, end), batch, &mut film, &mut self.report, hand_over);
+        let complete = self.run.pass(&guided, (start, end), batch, &mut film, &mut self.at.report, hand_over);
         if !complete && start > 0 {
             return false;
         }
-        pictures.extend(film, end - start, &moments);
-        self.report.spp = if complete { end } else { start };
+        self.at.pictures.extend(film, end - start, &moments);
+        self.at.report.spp = if complete { end } else { start };
         complete
     }
 }
