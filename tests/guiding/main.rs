@@ -5,6 +5,7 @@ mod cone;
 mod corrupted;
 mod determinism;
 mod field;
+mod roulette;
 #[path = "../support/mod.rs"]
 mod support;
 mod unbiased;
@@ -19,7 +20,7 @@ fn scene(text: &str, integrator: &str) -> Scene {
     resolve::resolve(&mut description).unwrap_or_else(|e| panic!("{e}"));
     upgrade::upgrade(&mut description);
     let mut registry = lucerna::builtin();
-    registry.add(corrupted::PLUGIN);
+    registry.add(corrupted::PLUGIN).add(roulette::PLUGIN);
     instantiate(&registry, description, false).unwrap_or_else(|e| panic!("{e}")).scene
 }
 

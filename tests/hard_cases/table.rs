@@ -120,6 +120,11 @@ const CASES: &[Case] = &[
     ("p08", "learning with any number of threads: equal bits", "-"),
     ("p09", "iterations that are black or without variance: finite weights, no black picture", "-"),
     ("p11", "the limit of memory: refinement ends, and says so", "-"),
+    (
+        "p14",
+        "roulette told of throughputs and light from 0 to 1e30, or of wrong light: answers in [0.05, 20], equal means",
+        "-",
+    ),
     ("p18", "a budget below one pass, or a stop while learning: a picture, with its samples told", "-"),
     ("x01", "any number of threads, any run: equal bits", "-"),
     ("x03", "100 000 samples, 16k x 16k pixels: no limit but memory, which is told before the start", "-"),

@@ -42,6 +42,7 @@ mod cylinder;
 mod field;
 mod learner;
 mod mixing;
+mod outlook;
 mod quadtree;
 mod spatial;
 
@@ -106,6 +107,8 @@ struct Settings {
     p_guide: Option<f32>,
     cosine: bool,
     max_bytes: usize,
+    /// Whether directions are learnt; else only what scattering brings.
+    directions: bool,
 }
 
 fn build(p: &Properties<'_>) -> Built<dyn Guide> {
@@ -126,6 +129,7 @@ fn build(p: &Properties<'_>) -> Built<dyn Guide> {
         p_guide: p.float_opt("p_guide").map(|p| p.min(MOST_GUIDED)),
         cosine: p.choice("product") == "cosine",
         max_bytes: (p.double("max_memory") * f64::from(1 << 20)) as usize,
+        directions: true,
     };
     let training = Training {
         startup: number("startup"),
@@ -147,6 +151,33 @@ fn build(p: &Properties<'_>) -> Built<dyn Guide> {
 struct SdTree {
     settings: Settings,
     training: Training,
+}
+
+/// Records after which a cell of space is halved where nothing but outlooks is learnt.
+const OUTLOOK_THRESHOLD: f64 = 500.0;
+
+/// The tree over space alone, for roulette of paths that are not guided. All samples count alike, since none is guided
+/// worse than others.
+pub(crate) fn outlook_alone() -> Arc<dyn Guide> {
+    let settings = Settings {
+        spatial_threshold: OUTLOOK_THRESHOLD,
+        directional_threshold: 1.0,
+        depth: 0,
+        spatial_filter: SpatialFilter::Nearest,
+        directional_filter: DirectionalFilter::Nearest,
+        p_guide: Some(0.0),
+        cosine: false,
+        max_bytes: 64 << 20,
+        directions: false,
+    };
+    let training = Training {
+        startup: 4,
+        combination: Combination::All,
+        emitter_sampling: EmitterSampling::Always,
+        learn_direct: true,
+        least_roughness: 0.0,
+    };
+    Arc::new(SdTree { settings, training })
 }
 
 impl Guide for SdTree {

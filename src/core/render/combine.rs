@@ -31,6 +31,11 @@ const ENOUGH: u32 = 4;
 pub struct Moments(Vec<(IVec2, f64, f64)>);
 
 impl Moments {
+    /// Pixels with the sum of their samples' luminance and of its square.
+    pub fn iter(&self) -> impl Iterator<Item = (IVec2, f64, f64)> {
+        self.0.iter().copied()
+    }
+
     /// Adds a sample; those of a pixel follow each other.
     #[inline]
     pub fn add(&mut self, pixel: IVec2, value: Radiance) {
@@ -96,10 +101,10 @@ impl Iterations {
 
     /// The samples that follow belong to another iteration.
     pub fn begin(&mut self) {
-        let kept = match self.policy {
-            Combination::InverseVariance => KEPT,
-            Combination::Last => 1,
-        };
+        if self.policy == Combination::All && !self.kept.is_empty() {
+            return;
+        }
+        let kept = self.most_kept();
         // While the new one is incomplete, the last complete ones all count.
         while self.kept.len() > kept {
             self.kept.pop_front();
@@ -129,12 +134,16 @@ impl Iterations {
 
     /// Ends the iteration under way: from now on the oldest no longer counts.
     pub fn complete(&mut self) {
-        let kept = match self.policy {
-            Combination::InverseVariance => KEPT,
-            Combination::Last => 1,
-        };
+        let kept = self.most_kept();
         while self.kept.len() > kept {
             self.kept.pop_front();
+        }
+    }
+
+    fn most_kept(&self) -> usize {
+        match self.policy {
+            Combination::InverseVariance => KEPT,
+            Combination::All | Combination::Last => 1,
         }
     }
 
@@ -143,7 +152,7 @@ impl Iterations {
         let sampled: Vec<&Iteration> = self.kept.iter().collect();
         let by_count = || sampled.iter().map(|i| [f64::from(i.spp); 2]).collect::<Vec<_>>();
         let mut weights = match self.policy {
-            Combination::Last => {
+            Combination::All | Combination::Last => {
                 let last = sampled.iter().rposition(|i| i.spp > 0);
                 (0..sampled.len()).map(|i| [f64::from(u8::from(Some(i) == last)); 2]).collect()
             }

@@ -7,6 +7,7 @@
 mod bad_samples;
 mod combine;
 mod control;
+mod estimates;
 mod film_store;
 mod notebook;
 mod reference_order;
@@ -17,7 +18,7 @@ mod training;
 pub use bad_samples::{BadSample, BadSamples};
 pub use control::{Budget, Control, OnPass, PassEnd, Progress, Schedule};
 pub use film_store::FilmStore;
-pub use notebook::{Notebook, Scattering};
+pub use notebook::{Notebook, Place, Scattering};
 pub use reference_order::ReferenceOrder;
 pub use tiles::{render_estimator, replay};
 pub use training::{Guidance, GuidedEstimator, render_guided};

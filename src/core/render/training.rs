@@ -8,10 +8,13 @@
 //! 10.2 and 10.7). How the pictures become one: [`super::combine`].
 
 use super::combine::{Iterations, Moments};
+use super::estimates::Estimates;
 use super::notebook::Notebook;
 use super::tiles::{Run, Tracer, asked_spp, points};
 use super::{Budget, RenderContext, RenderError, Report, SampleOrder};
-use crate::interfaces::{Arena, CameraRay, EmitterSampling, Guide, GuideField, GuideLearner, Radiance, Training};
+use crate::interfaces::{
+    Arena, CameraRay, EmitterSampling, Goal, Guide, GuideField, GuideLearner, Radiance, Subjects, Training,
+};
 use crate::sampling::Stream;
 use crate::scene::Scene;
 use glam::IVec2;
@@ -35,6 +38,10 @@ pub struct Guidance<'a> {
     pub sample_emitters: bool,
     /// Whether paths note what they find.
     pub learning: bool,
+    /// What the run is to learn, and goes by.
+    pub subjects: Subjects,
+    /// What is known of the pixel.
+    pub goal: Goal,
     /// Narrower lobes than this are not guided.
     pub least_roughness: f32,
 }
@@ -55,7 +62,8 @@ pub trait GuidedEstimator: Sync {
     ) -> Radiance;
 }
 
-/// Renders a guided estimator into the context's film until the budget is spent, and gives what was learnt.
+/// Renders a guided estimator into the context's film until the budget is spent, and gives what was learnt. `subjects`
+/// says what that is to be.
 ///
 /// # Errors
 /// If the context asks for what a run with learning cannot do.
@@ -63,6 +71,7 @@ pub fn render_guided(
     cx: &mut RenderContext<'_>,
     estimator: &dyn GuidedEstimator,
     guide: &dyn Guide,
+    subjects: Subjects,
 ) -> Result<(Report, Arc<dyn GuideField>), RenderError> {
     if cx.order != SampleOrder::PerSample {
         return Err(RenderError("random numbers in the reference's order and a guide exclude each other".to_owned()));
@@ -71,7 +80,8 @@ pub fn render_guided(
     let points = points(cx, asked);
     let run = Run::new(cx, points.as_deref(), asked);
     let learner = guide.start(cx.scene.accel().bounds());
-    let mut lesson = Lesson { cx, run, estimator, training: guide.training(), learner, report: Report::default() };
+    let (training, estimates, report) = (guide.training(), Estimates::new(cx.store.size()), Report::default());
+    let mut lesson = Lesson { cx, run, estimator, training, subjects, learner, estimates, report };
     let film = lesson.iterations(asked);
     let Lesson { run, mut report, learner, .. } = lesson;
     run.conclude(&mut report);
@@ -86,7 +96,9 @@ struct Lesson<'r, 'a> {
     run: Run<'r, 'a>,
     estimator: &'r dyn GuidedEstimator,
     training: Training,
+    subjects: Subjects,
     learner: Box<dyn GuideLearner>,
+    estimates: Estimates,
     report: Report,
 }
 
@@ -168,17 +180,26 @@ impl Lesson<'_, '_> {
             EmitterSampling::Always => true,
         };
         let Training { learn_direct, least_roughness, .. } = self.training;
+        let subjects = self.subjects;
+        if subjects.outlook && start > 0 {
+            self.estimates.update(self.report.rays as f64 / self.report.samples as f64);
+        }
         let (field, learner) = (self.learner.field(), &mut self.learner);
-        let guidance = Guidance { field: &*field, sample_emitters, learning, least_roughness };
-        let guided = Guided { estimator: self.estimator, guidance, learn_direct };
+        let goal = Goal::default();
+        let guidance = Guidance { field: &*field, sample_emitters, learning, subjects, goal, least_roughness };
+        let guided = Guided { estimator: self.estimator, guidance, learn_direct, estimates: &self.estimates };
         // Notes are taken in as they come, so that those of a few tiles at most are held. A pass that is lost afterwards
         // has taught something nevertheless.
         let batch = (NOTED / (end - start) as usize).max(1);
         let hand_over = |notes: Vec<TileNotes>| {
             let (records, found): (Vec<_>, Vec<_>) =
                 notes.into_iter().map(|TileNotes { book, moments }| (book.into_records(), moments)).unzip();
-            if learning {
+            let (records, vertices): (Vec<_>, Vec<_>) = records.into_iter().unzip();
+            if learning && subjects.directions {
                 learner.learn(&records);
+            }
+            if learning && subjects.outlook {
+                learner.learn_outlook(&vertices);
             }
             moments.extend(found);
         };
@@ -187,6 +208,9 @@ impl Lesson<'_, '_> {
             return false;
         }
         pictures.extend(film, end - start, &moments);
+        if subjects.outlook {
+            self.estimates.extend(end - start, &moments);
+        }
         self.report.spp = if complete { end } else { start };
         complete
     }
@@ -203,13 +227,14 @@ struct Guided<'a> {
     estimator: &'a dyn GuidedEstimator,
     guidance: Guidance<'a>,
     learn_direct: bool,
+    estimates: &'a Estimates,
 }
 
 impl Tracer for Guided<'_> {
     type Notes = TileNotes;
 
     fn notes(&self) -> TileNotes {
-        TileNotes { book: Notebook::new(self.learn_direct), moments: Moments::default() }
+        TileNotes { book: Notebook::new(self.learn_direct, self.guidance.subjects), moments: Moments::default() }
     }
 
     fn wants_differentials(&self) -> bool {
@@ -224,9 +249,11 @@ impl Tracer for Guided<'_> {
         stream: &mut Stream<'_>,
         arena: &mut Arena,
         aovs: &mut [f32],
+        pixel: IVec2,
         notes: &mut TileNotes,
     ) -> Radiance {
-        self.estimator.radiance(scene, camera, stream, arena, aovs, self.guidance, &mut notes.book)
+        let guidance = Guidance { goal: self.estimates.goal(pixel), ..self.guidance };
+        self.estimator.radiance(scene, camera, stream, arena, aovs, guidance, &mut notes.book)
     }
 
     #[inline]
