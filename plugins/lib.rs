@@ -11,6 +11,7 @@ pub mod guides;
 pub mod integrators;
 pub mod light_samplers;
 pub mod rfilters;
+pub mod roulettes;
 pub mod samplers;
 pub mod sensors;
 pub mod shapes;
@@ -29,6 +30,7 @@ pub fn builtin() -> Registry {
         .add_all(sensors::PLUGINS)
         .add_all(films::PLUGINS)
         .add_all(guides::PLUGINS)
+        .add_all(roulettes::PLUGINS)
         .add_all(rfilters::PLUGINS)
         .add_all(samplers::PLUGINS)
         .add_all(light_samplers::PLUGINS)

@@ -1,6 +1,7 @@
 //! What integrators share: common parameters, multiple importance sampling, light that a ray runs into.
 
 use super::lights::PickLights;
+pub use crate::roulettes::survival;
 use lucerna_core::accel::Ray;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{
@@ -72,13 +73,6 @@ pub fn mis_weight(a: f32, b: f32) -> f32 {
 pub fn balance_weight(a: f32, b: f32) -> f32 {
     let weight = a / (a + b);
     if weight.is_finite() { weight } else { 0.0 }
-}
-
-/// Survival probability of Russian roulette: the throughput's largest channel, with the compression of radiance in
-/// optically dense media taken out, at most 0.95 so that total internal reflection ends too.
-#[inline]
-pub fn survival(throughput: Rgb, eta: f32) -> f32 {
-    (throughput.max_component() * eta * eta).min(0.95)
 }
 
 /// The numbers for a BSDF sample, drawn as the reference draws them in `direct` and the volume integrators: its compiler

@@ -15,6 +15,7 @@
 //! | `hide_emitters` | boolean | false | lights are not seen directly; the light they give is unchanged |
 //! | nested `light_sampler` | | by the scene's weights | which light a vertex samples |
 //! | nested `guide` | | none | learns where light comes from, as `sd_tree` |
+//! | nested `roulette` | | `throughput`; with a guide `albedo` | whether a path goes on, stops or splits |
 //!
 //! ```xml
 //! <integrator type="path">
@@ -24,9 +25,10 @@
 
 use super::common::{COMMON, PATH, PathLimits, timeout};
 use super::lights::{ByScene, LIGHTS, Lights};
-use super::path_kernel::{Guided, Unguided, trace};
+use super::path_kernel::{ByThroughput, Guided, Unguided, trace};
+use crate::roulettes::ByAlbedo;
 use lucerna_core::color::Rgb;
-use lucerna_core::interfaces::{Arena, CameraRay, Guide, Integrator, Radiance, RadianceEstimator};
+use lucerna_core::interfaces::{Arena, CameraRay, Guide, Integrator, Radiance, RadianceEstimator, Roulette, Subjects};
 use lucerna_core::render::{
     Guidance, GuidedEstimator, Notebook, RenderContext, RenderError, Report, render_estimator, render_guided,
 };
@@ -39,36 +41,53 @@ pub const PLUGIN: Plugin = Plugin {
     name: "path",
     aliases: &[],
     summary: "path tracing with emitter sampling and multiple importance sampling",
-    params: &[COMMON, PATH, &[LIGHTS, Param::child(ObjectKind::Guide, 0, 1, "learns where light comes from")]],
+    params: &[
+        COMMON,
+        PATH,
+        &[
+            LIGHTS,
+            Param::child(ObjectKind::Guide, 0, 1, "learns where light comes from"),
+            Param::child(ObjectKind::Roulette, 0, 1, "decides whether a path goes on, stops or splits"),
+        ],
+    ],
     build: Constructor::Integrator(build),
 };
 
 fn build(p: &Properties<'_>) -> Built<dyn Integrator> {
-    Ok(Arc::new(Path { limits: PathLimits::new(p), lights: Lights::new(p), timeout: timeout(p), guide: p.guide() }))
+    let (limits, lights, timeout) = (PathLimits::new(p), Lights::new(p), timeout(p));
+    let (guide, roulette) = (p.guide(), p.roulette());
+    let teacher = roulette.as_ref().and_then(|roulette| roulette.teacher());
+    let subjects = Subjects { directions: guide.is_some(), outlook: teacher.is_some() };
+    Ok(Arc::new(Path { limits, lights, timeout, teacher: guide.or(teacher), subjects, roulette }))
 }
 
 struct Path {
     limits: PathLimits,
     lights: Lights,
     timeout: Option<f64>,
-    guide: Option<Arc<dyn Guide>>,
+    /// Who learns from the samples: a guide, or somebody who learns for roulette alone.
+    teacher: Option<Arc<dyn Guide>>,
+    subjects: Subjects,
+    roulette: Option<Arc<dyn Roulette>>,
 }
 
 impl Path {
     /// With lights that are ready for a scene; `None` where nothing has to be made.
     fn prepared(&self, scene: &Scene) -> Option<Self> {
         let lights = self.lights.prepare(scene)?;
-        Some(Path { lights, guide: self.guide.clone(), ..*self })
+        let (teacher, roulette) = (self.teacher.clone(), self.roulette.clone());
+        Some(Path { lights, teacher, roulette, ..*self })
     }
 }
 
 impl Integrator for Path {
     fn render(&self, cx: &mut RenderContext<'_>) -> Result<Report, RenderError> {
-        match &self.guide {
+        match &self.teacher {
             None => render_estimator(cx, self),
-            Some(guide) => {
+            Some(teacher) => {
                 let prepared = self.prepared(cx.scene);
-                render_guided(cx, prepared.as_ref().unwrap_or(self), &**guide).map(|(report, _)| report)
+                let estimator = prepared.as_ref().unwrap_or(self);
+                render_guided(cx, estimator, &**teacher, self.subjects).map(|(report, _)| report)
             }
         }
     }
@@ -79,7 +98,7 @@ impl Integrator for Path {
 
     /// Samples that are guided depend on those before.
     fn estimator(&self) -> Option<&dyn RadianceEstimator> {
-        self.guide.is_none().then_some(self)
+        self.teacher.is_none().then_some(self)
     }
 }
 
@@ -96,9 +115,12 @@ impl RadianceEstimator for Path {
         arena: &mut Arena,
         _aovs: &mut [f32],
     ) -> Radiance {
-        match self.lights.ready() {
-            None => trace(self.limits, scene, &ByScene, camera, stream, arena, &mut Unguided),
-            Some(lights) => trace(self.limits, scene, &lights, camera, stream, arena, &mut Unguided),
+        let (limits, to) = (self.limits, &mut Unguided);
+        match (self.lights.ready(), &self.roulette) {
+            (None, None) => trace(limits, scene, &ByScene, &ByThroughput, camera, stream, arena, to),
+            (Some(lights), None) => trace(limits, scene, &lights, &ByThroughput, camera, stream, arena, to),
+            (None, Some(roulette)) => trace(limits, scene, &ByScene, &&**roulette, camera, stream, arena, to),
+            (Some(lights), Some(roulette)) => trace(limits, scene, &lights, &&**roulette, camera, stream, arena, to),
         }
     }
 }
@@ -116,9 +138,11 @@ impl GuidedEstimator for Path {
     ) -> Radiance {
         let arena = &*arena;
         let mut directions = Guided { guidance, notes, arena, prospects: Rgb::WHITE };
+        let (limits, to) = (self.limits, &mut directions);
+        let roulette: &dyn Roulette = self.roulette.as_deref().unwrap_or(&ByAlbedo);
         match self.lights.ready() {
-            None => trace(self.limits, scene, &ByScene, camera, stream, arena, &mut directions),
-            Some(lights) => trace(self.limits, scene, &lights, camera, stream, arena, &mut directions),
+            None => trace(limits, scene, &ByScene, &roulette, camera, stream, arena, to),
+            Some(lights) => trace(limits, scene, &lights, &roulette, camera, stream, arena, to),
         }
     }
 }

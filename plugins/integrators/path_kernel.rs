@@ -7,13 +7,14 @@ use super::common::{Met, PathLimits, Scattered, find_surface, mis_weight, scatte
 use super::lights::PickLights;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{
-    Arena, Bxdf, BxdfSample, CameraRay, GuidedDirections, LightSample, Lobes, MOST_GUIDED, Radiance, RecordKind,
-    SurfaceHit, Transport,
+    Arena, Bxdf, BxdfSample, CameraRay, Goal, GuidedDirections, LightSample, Lobes, MOST_GUIDED, Outlook, PathState,
+    Radiance, RecordKind, Roulette, SurfaceHit, Transport, continuations,
 };
 use lucerna_core::math::{ONE_MINUS_EPSILON, Vec2, Vec3};
-use lucerna_core::render::{Guidance, Notebook, Scattering};
+use lucerna_core::render::{Guidance, Notebook, Place, Scattering};
 use lucerna_core::sampling::Stream;
 use lucerna_core::scene::Scene;
+use std::cell::Cell;
 
 /// Who decides in which direction a path goes on, and keeps notes.
 pub(super) trait Directions {
@@ -32,8 +33,23 @@ pub(super) trait Directions {
     /// Where the path goes on, in world space, and how.
     fn sample(here: Self::Here, hit: &SurfaceHit, bxdf: &dyn Bxdf, u1: f32, u2: Vec2) -> Option<Step>;
 
-    /// What roulette is to judge the path by, whose throughput is this.
+    /// What the throughput, which is this, would be about if directions came from the BSDF; not less than it is.
     fn prospects(&self, throughput: Rgb) -> Rgb;
+
+    /// Goes back to a vertex, where the prospects were these.
+    fn resume(&mut self, prospects: Rgb);
+
+    /// What is known of the pixel.
+    fn goal(&self) -> Goal;
+
+    /// Whether what scattering brings is learnt, so that paths may split or end before they are scattered.
+    fn looks_ahead(&self) -> bool;
+
+    /// What scattering at a vertex brings, as far as is known.
+    fn outlook(&self, place: &Place) -> Option<Outlook>;
+
+    /// Notes that so many branches go on from a vertex, each with this share, after so many rays.
+    fn note_fork(&mut self, place: Place, count: u32, share: f32, rays: u32);
 
     /// Notes light of a sampled emitter.
     fn note_direct(&mut self, light: Rgb);
@@ -47,8 +63,8 @@ pub(super) trait Directions {
     /// Notes light that was found by chance.
     fn note_met(&mut self, light: Rgb, alone: bool);
 
-    /// Notes the end of the path.
-    fn note_end(&mut self);
+    /// Notes the end of the path, or of a branch, after so many rays.
+    fn note_end(&mut self, rays: u32);
 }
 
 /// A direction that was chosen.
@@ -94,6 +110,27 @@ impl Directions for Unguided {
     }
 
     #[inline(always)]
+    fn resume(&mut self, _prospects: Rgb) {}
+
+    #[inline(always)]
+    fn goal(&self) -> Goal {
+        Goal::default()
+    }
+
+    #[inline(always)]
+    fn looks_ahead(&self) -> bool {
+        false
+    }
+
+    #[inline(always)]
+    fn outlook(&self, _place: &Place) -> Option<Outlook> {
+        None
+    }
+
+    #[inline(always)]
+    fn note_fork(&mut self, _place: Place, _count: u32, _share: f32, _rays: u32) {}
+
+    #[inline(always)]
     fn note_direct(&mut self, _light: Rgb) {}
 
     #[inline(always)]
@@ -106,7 +143,7 @@ impl Directions for Unguided {
     fn note_met(&mut self, _light: Rgb, _alone: bool) {}
 
     #[inline(always)]
-    fn note_end(&mut self) {}
+    fn note_end(&mut self, _rays: u32) {}
 }
 
 /// Directions come from the mixture of a guide and the BSDF.
@@ -142,7 +179,8 @@ impl<'a> Directions for Guided<'a> {
     fn here(&self, hit: &SurfaceHit, bxdf: &dyn Bxdf) -> Learnt<'a> {
         let lobes = bxdf.lobes();
         let hybrid = lobes.has_delta();
-        if !lobes.is_smooth() || bxdf.roughness() < self.guidance.least_roughness {
+        let directs = self.guidance.subjects.directions;
+        if !directs || !lobes.is_smooth() || bxdf.roughness() < self.guidance.least_roughness {
             return Learnt { guide: None, teaches: false, hybrid };
         }
         let one_sided = !lobes.and(Lobes::SMOOTH).intersects(Lobes::TRANSMISSION);
@@ -210,6 +248,34 @@ impl<'a> Directions for Guided<'a> {
     }
 
     #[inline]
+    fn resume(&mut self, prospects: Rgb) {
+        self.prospects = prospects;
+    }
+
+    #[inline]
+    fn goal(&self) -> Goal {
+        self.guidance.goal
+    }
+
+    #[inline]
+    fn looks_ahead(&self) -> bool {
+        self.guidance.subjects.outlook
+    }
+
+    #[inline]
+    fn outlook(&self, place: &Place) -> Option<Outlook> {
+        self.guidance.field.outlook(place.p, place.n)
+    }
+
+    #[inline]
+    fn note_fork(&mut self, place: Place, count: u32, share: f32, rays: u32) {
+        self.prospects *= share;
+        if self.guidance.learning {
+            self.notes.forked(place, count, share, rays);
+        }
+    }
+
+    #[inline]
     fn note_direct(&mut self, light: Rgb) {
         if self.guidance.learning {
             self.notes.direct(light);
@@ -254,9 +320,9 @@ impl<'a> Directions for Guided<'a> {
     }
 
     #[inline]
-    fn note_end(&mut self) {
+    fn note_end(&mut self, rays: u32) {
         if self.guidance.learning {
-            self.notes.end();
+            self.notes.end(rays);
         }
     }
 }
@@ -266,15 +332,79 @@ fn at_least(color: Rgb, least: f32) -> Rgb {
     Rgb::new(color.r.max(least), color.g.max(least), color.b.max(least))
 }
 
-/// Follows one path.
+/// What roulette decides.
+pub(super) trait Decides {
+    /// Whether paths may split, or end before they are scattered.
+    const BRANCHES: bool;
+
+    /// See [`Roulette::branches`].
+    fn branches(&self, path: &PathState, albedo: Rgb, outlook: Option<Outlook>) -> f32;
+
+    /// See [`Roulette::survival`].
+    fn survival(&self, path: &PathState, delta: bool) -> f32;
+}
+
+/// By the throughput, as the reference.
+pub(super) struct ByThroughput;
+
+impl Decides for ByThroughput {
+    const BRANCHES: bool = false;
+
+    #[inline(always)]
+    fn branches(&self, _path: &PathState, _albedo: Rgb, _outlook: Option<Outlook>) -> f32 {
+        1.0
+    }
+
+    #[inline(always)]
+    fn survival(&self, path: &PathState, _delta: bool) -> f32 {
+        survival(path.throughput, path.eta)
+    }
+}
+
+impl Decides for &dyn Roulette {
+    const BRANCHES: bool = true;
+
+    #[inline]
+    fn branches(&self, path: &PathState, albedo: Rgb, outlook: Option<Outlook>) -> f32 {
+        Roulette::branches(*self, path, albedo, outlook)
+    }
+
+    #[inline]
+    fn survival(&self, path: &PathState, delta: bool) -> f32 {
+        Roulette::survival(*self, path, delta)
+    }
+}
+
+/// Continuations of all splits of a camera sample together, at most.
+const MOST_SPLITS: u32 = 1000;
+
+/// A vertex from which further branches are to go on. Lies in the arena.
+struct Branch<'v, H> {
+    hit: SurfaceHit,
+    here: H,
+    throughput: Rgb,
+    prospects: Rgb,
+    eta: f32,
+    depth: u32,
+    /// How many are still to go on.
+    left: Cell<u32>,
+    /// What their random numbers depend on.
+    key: u64,
+    /// The one before, whose turn comes afterwards.
+    below: Option<&'v Branch<'v, H>>,
+}
+
+/// Follows one path, and all its branches.
 #[inline(always)]
-pub(super) fn trace<D: Directions>(
+#[allow(clippy::too_many_arguments)]
+pub(super) fn trace<'v, D: Directions<Here: 'v>, R: Decides>(
     limits: PathLimits,
     scene: &Scene,
     lights: &impl PickLights,
+    roulette: &R,
     camera: &CameraRay,
     stream: &mut Stream<'_>,
-    arena: &Arena,
+    arena: &'v Arena,
     directions: &mut D,
 ) -> Radiance {
     let PathLimits { max_depth, rr_depth, hide_emitters } = limits;
@@ -291,80 +421,158 @@ pub(super) fn trace<D: Directions>(
     let mut last: Option<Scattered> = None;
     let mut depth = 0;
     let mut hit = SurfaceHit::default();
-    loop {
-        let hidden = hide_emitters && depth == 0;
-        let met = find_surface(scene, &ray, hidden, &mut hit, &mut found.rays);
-        if !hidden
-            && let Some(Met { light, alone }) =
-                weighted_emission(scene, lights, &ray, met.then_some(&hit), last, mis_weight)
-        {
-            directions.note_met(light, alone);
-            found.rgb += throughput * light;
-        }
-        if !met {
-            break;
-        }
-        if depth + 1 >= max_depth {
-            if depth == 0 && !found.rgb.is_black() {
+    // What roulette has not used of the last random number drawn for it.
+    let mut u_left = 0.0;
+    let mut splits = 0;
+    let mut branch: Option<&'v Branch<'v, D::Here>> = None;
+    let mut resumed: Option<D::Here> = None;
+    'paths: loop {
+        'path: {
+            let resumes = R::BRANCHES && resumed.is_some();
+            if !resumes {
+                let hidden = hide_emitters && depth == 0;
+                let met = find_surface(scene, &ray, hidden, &mut hit, &mut found.rays);
+                if !hidden
+                    && let Some(Met { light, alone }) =
+                        weighted_emission(scene, lights, &ray, met.then_some(&hit), last, mis_weight)
+                {
+                    directions.note_met(light, alone);
+                    found.rgb += throughput * light;
+                }
+                if !met {
+                    break 'path;
+                }
+                if depth + 1 >= max_depth {
+                    if depth == 0 && !found.rgb.is_black() {
+                        found.alpha = 1.0;
+                    }
+                    break 'path;
+                }
+            }
+            let bsdf = scene.bsdf(&hit);
+            let bxdf = bsdf.resolve(&hit, arena);
+            let here = match resumed.take() {
+                Some(here) if R::BRANCHES => here,
+                _ => directions.here(&hit, bxdf),
+            };
+            let lobes = bsdf.lobes();
+            if R::BRANCHES && directions.looks_ahead() && !resumes && lobes.is_smooth() {
+                let place = Place { p: hit.p, n: hit.frame.n * 1f32.copysign(hit.wi.z), albedo: bxdf.albedo(hit.wi) };
+                let path = PathState {
+                    throughput,
+                    prospects: directions.prospects(throughput),
+                    eta,
+                    due: depth >= rr_depth,
+                    depth,
+                    goal: directions.goal(),
+                };
+                // Whether the sample is transparent does not depend on how it goes on from here.
+                let opaque = found.alpha > 0.0 || !lobes.intersects(Lobes::NULL);
+                let asked = depth > 0 && opaque;
+                let wanted = match asked {
+                    true => limited(roulette.branches(&path, place.albedo, directions.outlook(&place)), splits),
+                    false => 1.0,
+                };
+                let count = wanted as u32 + u32::from(u_left < wanted.fract());
+                if asked {
+                    found.alpha = 1.0;
+                }
+                if count == 0 {
+                    break 'path;
+                }
+                splits += count - 1;
+                throughput *= 1.0 / wanted;
+                directions.note_fork(place, count, 1.0 / wanted, found.rays);
+                if count > 1 {
+                    let (left, key) = (Cell::new(count - 1), stream.key());
+                    let prospects = path.prospects * (1.0 / wanted);
+                    branch = Some(arena.alloc(Branch {
+                        hit,
+                        here,
+                        throughput,
+                        prospects,
+                        eta,
+                        depth,
+                        left,
+                        key,
+                        below: branch,
+                    }));
+                }
+            }
+            let from = lights.vertex(&hit, lobes);
+            let worth = |light: &LightSample| {
+                let (contribution, pdf) = scattered(scene, &hit, bxdf, light);
+                (contribution * weight_of::<D>(light, here, pdf)).luminance()
+            };
+            if lobes.is_smooth()
+                && let Some(light) = lights.sample(scene, &from, stream, worth)
+                // What no ray can run into must be sampled in any case.
+                && (light.delta || directions.samples_emitters())
+            {
+                let direct = direct_light::<D>(scene, &hit, bxdf, &light, here, &mut found.rays);
+                directions.note_direct(direct);
+                found.rgb += throughput * direct;
+            }
+            let (u1, u2) = (stream.next_1d(), stream.next_2d());
+            let step = D::sample(here, &hit, bxdf, u1, u2);
+            // Drawn at every vertex, needed or not: the numbers of the next sample depend on it in the reference's order.
+            let u_roulette = stream.next_1d();
+            let Some(step) = step.filter(|step| scene.keeps_sides(&hit, step.sample.wo)) else {
+                found.alpha = 1.0;
+                break 'path;
+            };
+            let sample = &step.sample;
+            throughput *= sample.weight;
+            eta *= sample.eta;
+            if sample.lobe != Lobes::NULL {
                 found.alpha = 1.0;
             }
-            break;
-        }
-        let bsdf = scene.bsdf(&hit);
-        let bxdf = bsdf.resolve(&hit, arena);
-        let here = directions.here(&hit, bxdf);
-        let lobes = bsdf.lobes();
-        let from = lights.vertex(&hit, lobes);
-        let worth = |light: &LightSample| {
-            let (contribution, pdf) = scattered(scene, &hit, bxdf, light);
-            (contribution * weight_of::<D>(light, here, pdf)).luminance()
-        };
-        if lobes.is_smooth()
-            && let Some(light) = lights.sample(scene, &from, stream, worth)
-            // What no ray can run into must be sampled in any case.
-            && (light.delta || directions.samples_emitters())
-        {
-            let direct = direct_light::<D>(scene, &hit, bxdf, &light, here, &mut found.rays);
-            directions.note_direct(direct);
-            found.rgb += throughput * direct;
-        }
-        let (u1, u2) = (stream.next_1d(), stream.next_2d());
-        let step = D::sample(here, &hit, bxdf, u1, u2);
-        // Drawn at every vertex, needed or not: the numbers of the next sample depend on it in the reference's order.
-        let u_roulette = stream.next_1d();
-        let Some(step) = step.filter(|step| scene.keeps_sides(&hit, step.sample.wo)) else {
-            found.alpha = 1.0;
-            break;
-        };
-        let sample = &step.sample;
-        throughput *= sample.weight;
-        eta *= sample.eta;
-        if sample.lobe != Lobes::NULL {
-            found.alpha = 1.0;
-        }
-        ray = hit.leave(step.d);
-        let weighs = !sample.lobe.has_delta() && directions.samples_emitters();
-        last = weighs.then_some(Scattered { from, pdf: sample.pdf });
-        depth += 1;
-        directions.note_step(here, &hit, bxdf, &step);
+            ray = hit.leave(step.d);
+            let delta = sample.lobe.has_delta();
+            let weighs = !delta && directions.samples_emitters();
+            last = weighs.then_some(Scattered { from, pdf: sample.pdf });
+            depth += 1;
+            directions.note_step(here, &hit, bxdf, &step);
 
-        if throughput.is_black() {
-            break;
-        }
-        if depth >= rr_depth {
-            let q = survival(directions.prospects(throughput), eta);
-            if u_roulette >= q {
-                break;
+            if throughput.is_black() {
+                break 'path;
             }
-            throughput *= 1.0 / q;
-            directions.note_survival(q);
+            u_left = u_roulette;
+            if depth >= rr_depth {
+                let (prospects, goal) = (directions.prospects(throughput), directions.goal());
+                let q = roulette.survival(&PathState { throughput, prospects, eta, due: true, depth, goal }, delta);
+                if u_roulette >= q {
+                    break 'path;
+                }
+                throughput *= 1.0 / q;
+                directions.note_survival(q);
+                u_left = u_roulette / q;
+            }
+            continue 'paths;
+        }
+        directions.note_end(found.rays);
+        let Some(next) = branch.filter(|_| R::BRANCHES) else { break };
+        (hit, throughput, eta, depth) = (next.hit, next.throughput, next.eta, next.depth);
+        directions.resume(next.prospects);
+        resumed = Some(next.here);
+        let left = next.left.get();
+        *stream = Stream::branch(next.key, left);
+        next.left.set(left - 1);
+        if left == 1 {
+            branch = next.below;
         }
     }
-    directions.note_end();
     if found.alpha == 0.0 {
         found.rgb = Rgb::BLACK;
     }
     found
+}
+
+/// An answer of roulette as it is followed, after so many splits.
+#[inline]
+fn limited(answer: f32, splits: u32) -> f32 {
+    let wanted = continuations(answer);
+    if splits < MOST_SPLITS { wanted } else { wanted.min(1.0) }
 }
 
 /// Light of one emitter sample scattered at a hit, weighted against the sampling of directions.

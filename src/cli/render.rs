@@ -58,6 +58,10 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME")]
     guide: Option<String>,
 
+    /// What decides whether paths go on, stop or split, as NAME or NAME:parameter=value,…
+    #[arg(long, value_name = "NAME")]
+    roulette: Option<String>,
+
     /// Another sampler, as NAME or NAME:parameter=value,…
     #[arg(long, value_name = "NAME")]
     sampler: Option<String>,
@@ -159,6 +163,10 @@ pub fn run(registry: &Registry, arguments: &Arguments) -> Result<ExitCode, Failu
     }
     if let Some(text) = &arguments.light_sampler {
         let node = short_form::parse(ObjectKind::LightSampler, text, "--light-sampler").map_err(Failure::new)?;
+        short_form::decide(&mut description, registry, &node).map_err(Failure::new)?;
+    }
+    if let Some(text) = &arguments.roulette {
+        let node = short_form::parse(ObjectKind::Roulette, text, "--roulette").map_err(Failure::new)?;
         short_form::decide(&mut description, registry, &node).map_err(Failure::new)?;
     }
     if let Some(size) = arguments.size {

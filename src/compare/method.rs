@@ -56,6 +56,8 @@ struct Entry {
     guide: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     light_sampler: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    roulette: Option<String>,
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     parameters: BTreeMap<String, toml::Value>,
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
@@ -120,6 +122,7 @@ impl Entry {
             sampler: method.sampler.as_ref().map(short),
             guide: decision(ObjectKind::Guide),
             light_sampler: decision(ObjectKind::LightSampler),
+            roulette: decision(ObjectKind::Roulette),
             parameters: parameters.map(|p| (p.name.clone(), value(&p.value))).collect(),
             define: method.defines.iter().cloned().collect(),
         }
@@ -192,6 +195,8 @@ impl Method {
         let light_sampler = entry.light_sampler.map(|text| parse(ObjectKind::LightSampler, &text, "light_sampler"));
         method.decisions.extend(guide);
         method.decisions.extend(light_sampler.transpose()?);
+        let roulette = entry.roulette.map(|text| parse(ObjectKind::Roulette, &text, "roulette"));
+        method.decisions.extend(roulette.transpose()?);
         if !entry.parameters.is_empty() {
             let node = method.integrator.as_mut().ok_or("parameters need an integrator")?;
             for (name, value) in entry.parameters {

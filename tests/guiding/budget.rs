@@ -3,7 +3,9 @@
 
 use super::{SCENES, field, scene};
 use lucerna::core::color::Rgb;
-use lucerna::core::interfaces::{Arena, CameraRay, Guide, GuideField, GuideLearner, GuideRecord, Radiance, Training};
+use lucerna::core::interfaces::{
+    Arena, CameraRay, Guide, GuideField, GuideLearner, GuideRecord, Radiance, Subjects, Training,
+};
 use lucerna::core::math::Aabb;
 use lucerna::core::render::{
     Budget, Control, Guidance, GuidedEstimator, Notebook, RenderContext, Report, render_guided,
@@ -13,6 +15,9 @@ use lucerna::core::scene::Scene;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
+
+/// What these runs learn.
+const DIRECTIONS: Subjects = Subjects { directions: true, outlook: false };
 
 /// Shows nanoseconds.
 type Nanoseconds = Arc<AtomicU64>;
@@ -122,7 +127,7 @@ fn run(seconds: f64) -> (Report, u64, u64) {
     let (report, pixels) = pool.install(|| {
         let budget = Budget::Seconds(seconds);
         let mut cx = RenderContext::new(&scene, &scene.sensors()[0], budget, 1, &control, Vec::new());
-        let (report, _) = render_guided(&mut cx, &samples, &guide).expect("it renders");
+        let (report, _) = render_guided(&mut cx, &samples, &guide, DIRECTIONS).expect("it renders");
         (report, u64::from(cx.film.crop_size.x * cx.film.crop_size.y))
     });
     (report, samples.of_the_last.into_inner(), pixels)
@@ -155,7 +160,7 @@ fn learning_ends_when_it_no_longer_pays() {
         let (control, budget) = (Control::new(), Budget::Samples(spp));
         let mut cx = RenderContext::new(&scene, &scene.sensors()[0], budget, 1, &control, Vec::new());
         let noise = Noise { iterations: iterations.clone(), factor };
-        let (report, _) = render_guided(&mut cx, &noise, &guide).expect("it renders");
+        let (report, _) = render_guided(&mut cx, &noise, &guide, DIRECTIONS).expect("it renders");
         assert_eq!(report.spp, spp);
         iterations.load(Ordering::Relaxed)
     };

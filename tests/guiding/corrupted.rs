@@ -2,7 +2,8 @@
 
 use super::cone;
 use lucerna::core::interfaces::{
-    Arena, Guide, GuideField, GuideLearner, GuideRecord, GuidedDirections, SurfaceHit, Training, mix,
+    Arena, Guide, GuideField, GuideLearner, GuideRecord, GuidedDirections, Outlook, SurfaceHit, Training, VertexRecord,
+    mix,
 };
 use lucerna::core::math::{Aabb, Vec2, Vec3};
 use lucerna::core::sampling::warp::square_to_sphere;
@@ -23,6 +24,7 @@ pub const PLUGIN: Plugin = Plugin {
     params: &[&[
         Param::string("way", "none", "in which way; \"wrong\" has a density that is not that of its samples"),
         Param::float_opt("p_guide", "probability of the guide; as learnt if unset"),
+        Param::string("outlook", "learnt", "what is told to roulette: learnt, zero, huge, nan, or random"),
         Param::choice("nee", &["never", "kickstart", "always"], "always", "when lights are sampled"),
     ]],
     build: Constructor::Guide(build),
@@ -49,7 +51,8 @@ fn build(p: &Properties<'_>) -> Built<dyn Guide> {
     };
     match build_one(&lucerna::builtin(), &Description::of(node)) {
         Ok(Object::Guide(inner)) => {
-            Ok(Arc::new(Corrupted { inner, way: p.string("way").to_owned(), p_guide: p.float_opt("p_guide") }))
+            let (way, outlook) = (p.string("way").to_owned(), p.string("outlook").to_owned());
+            Ok(Arc::new(Corrupted { inner, spoils: Spoils { way, outlook, p_guide: p.float_opt("p_guide") } }))
         }
         _ => Err(p.error("", "sd_tree cannot be built")),
     }
@@ -57,13 +60,20 @@ fn build(p: &Properties<'_>) -> Built<dyn Guide> {
 
 struct Corrupted {
     inner: Arc<dyn Guide>,
+    spoils: Spoils,
+}
+
+/// What is spoilt.
+#[derive(Clone)]
+struct Spoils {
     way: String,
+    outlook: String,
     p_guide: Option<f32>,
 }
 
 impl Guide for Corrupted {
     fn start(&self, bounds: Aabb) -> Box<dyn GuideLearner> {
-        Box::new(Learner { inner: self.inner.start(bounds), way: self.way.clone(), p_guide: self.p_guide })
+        Box::new(Learner { inner: self.inner.start(bounds), spoils: self.spoils.clone() })
     }
 
     fn training(&self) -> Training {
@@ -73,13 +83,16 @@ impl Guide for Corrupted {
 
 struct Learner {
     inner: Box<dyn GuideLearner>,
-    way: String,
-    p_guide: Option<f32>,
+    spoils: Spoils,
 }
 
 impl GuideLearner for Learner {
     fn learn(&mut self, tiles: &[Vec<GuideRecord>]) {
         self.inner.learn(tiles);
+    }
+
+    fn learn_outlook(&mut self, tiles: &[Vec<VertexRecord>]) {
+        self.inner.learn_outlook(tiles);
     }
 
     fn refine(&mut self, spp: u32) {
@@ -88,7 +101,7 @@ impl GuideLearner for Learner {
     }
 
     fn field(&self) -> Arc<dyn GuideField> {
-        Arc::new(Field { inner: self.inner.field(), way: self.way.clone(), p_guide: self.p_guide })
+        Arc::new(Field { inner: self.inner.field(), spoils: self.spoils.clone() })
     }
 
     fn summary(&self) -> Vec<String> {
@@ -98,24 +111,41 @@ impl GuideLearner for Learner {
 
 struct Field {
     inner: Arc<dyn GuideField>,
-    way: String,
-    p_guide: Option<f32>,
+    spoils: Spoils,
+}
+
+/// A number that differs from place to place.
+fn key(p: Vec3) -> u64 {
+    let place = (p * 4.0).floor();
+    [place.x, place.y, place.z].iter().fold(0, |key, x| mix(key ^ u64::from(x.to_bits())))
 }
 
 impl GuideField for Field {
     fn at<'g>(&'g self, hit: &SurfaceHit, one_sided: bool, arena: &'g Arena) -> Option<&'g dyn GuidedDirections> {
-        if self.way == "empty" {
+        if self.spoils.way == "empty" {
             return None;
         }
         let inner = self.inner.at(hit, one_sided, arena)?;
-        let place = (hit.p * 4.0).floor();
-        let key = [place.x, place.y, place.z].iter().fold(0, |key, x| mix(key ^ u64::from(x.to_bits())));
-        let p_guide = self.p_guide.unwrap_or_else(|| inner.p_guide());
-        Some(arena.alloc(Spoilt { inner, way: &self.way, p_guide, key }))
+        let p_guide = self.spoils.p_guide.unwrap_or_else(|| inner.p_guide());
+        Some(arena.alloc(Spoilt { inner, way: &self.spoils.way, p_guide, key: key(hit.p) }))
     }
 
     fn incident(&self, p: Vec3, d: Vec3) -> Option<f32> {
         self.inner.incident(p, d)
+    }
+
+    fn outlook(&self, p: Vec3, n: Vec3) -> Option<Outlook> {
+        let all = |x| Some(Outlook { light: x, square: x, cost: x });
+        match &*self.spoils.outlook {
+            "zero" => all(0.0),
+            "huge" => all(1e30),
+            "nan" => all(f32::NAN),
+            "random" => {
+                let part = |i: u64| ((mix(key(p) ^ i) % 8) as f32 - 4.0).exp2();
+                Some(Outlook { light: part(1), square: part(2), cost: part(3) })
+            }
+            _ => self.inner.outlook(p, n),
+        }
     }
 
     fn validate(&self) -> Result<(), String> {

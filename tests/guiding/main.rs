@@ -8,6 +8,7 @@ mod determinism;
 mod field;
 mod kept;
 mod published;
+mod roulette;
 #[path = "../support/mod.rs"]
 mod support;
 mod unbiased;
@@ -22,7 +23,7 @@ fn scene(text: &str, integrator: &str) -> Scene {
     resolve::resolve(&mut description).unwrap_or_else(|e| panic!("{e}"));
     upgrade::upgrade(&mut description);
     let mut registry = lucerna::builtin();
-    registry.add(corrupted::PLUGIN);
+    registry.add(corrupted::PLUGIN).add(roulette::PLUGIN);
     instantiate(&registry, description, false).unwrap_or_else(|e| panic!("{e}")).scene
 }
 

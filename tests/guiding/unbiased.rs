@@ -20,13 +20,13 @@ fn pictures(text: &str, integrator: &str, spp: u32, first_seed: u32) -> Measured
     Measured::of(&shots, &["R", "G", "B"].map(str::to_owned)).expect("ten pictures of a size")
 }
 
-fn path(depth: u32, guide: &str) -> String {
+pub fn path(depth: u32, guide: &str) -> String {
     format!("<integrator type='path'><integer name='max_depth' value='{depth}'/>{guide}</integrator>")
 }
 
 /// Compares guides with `path` in these scenes; the level of 1 % is shared among all of them. Gives the error of the mean
 /// that would be found.
-fn agree(scenes: &[(&str, &str)], guides: &[String], depth: u32, spp: u32) -> f64 {
+pub fn agree(scenes: &[(&str, &str)], guides: &[String], depth: u32, spp: u32) -> f64 {
     let level = sidak(0.01, guides.len() * scenes.len());
     let mut blind: f64 = 0.0;
     for &(name, text) in scenes {

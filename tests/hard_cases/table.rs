@@ -122,6 +122,11 @@ const CASES: &[Case] = &[
     ("p09", "iterations that are black or without variance: finite weights, no black picture", "-"),
     ("p11", "the limit of memory: refinement ends, and says so", "-"),
     (
+        "p14",
+        "roulette told of throughputs and light from 0 to 1e30, or of wrong light: answers in [0.05, 20], equal means",
+        "-",
+    ),
+    (
         "p18",
         "a budget below one pass, or a stop while learning: a picture, with its samples told; a time limit is kept",
         "-",

@@ -17,8 +17,9 @@ mod textures;
 use lucerna::core::scene::ObjectKind;
 
 /// Sensors, films and integrators have no density of their own to test: they are under test in `plugins` beside their
-/// code, and whole pictures in `tests/analytic.rs` and `tests/references.rs`. Guides are in `tests/guiding`.
-const ELSEWHERE: [ObjectKind; 4] = [ObjectKind::Sensor, ObjectKind::Film, ObjectKind::Integrator, ObjectKind::Guide];
+/// code, and whole pictures in `tests/analytic.rs` and `tests/references.rs`. Guides and roulettes are in `tests/guiding`.
+const ELSEWHERE: [ObjectKind; 5] =
+    [ObjectKind::Sensor, ObjectKind::Film, ObjectKind::Integrator, ObjectKind::Guide, ObjectKind::Roulette];
 const HERE: [ObjectKind; 7] = [
     ObjectKind::Bsdf,
     ObjectKind::Emitter,

@@ -1,9 +1,10 @@
 //! What has been learnt, to be sampled.
 
 use super::cylinder;
+use super::outlook::{SIDES, side};
 use super::quadtree::{CELLS, EDGE, Quadtree, UNIFORM};
 use super::spatial::SpatialTree;
-use lucerna_core::interfaces::{Arena, GuideField, GuidedDirections, SurfaceHit};
+use lucerna_core::interfaces::{Arena, GuideField, GuidedDirections, Outlook, SurfaceHit};
 use lucerna_core::math::{Vec2, Vec3};
 use std::sync::{Arc, LazyLock};
 
@@ -24,6 +25,8 @@ pub struct Leaf {
     pub p_guide: f32,
     /// Mean radiance times 4π that arrived.
     pub fluence: f32,
+    /// What scattering has brought, for each side that surfaces may face.
+    pub outlooks: [Option<Outlook>; SIDES],
 }
 
 impl GuideField for Field {
@@ -40,6 +43,10 @@ impl GuideField for Field {
         let tree = leaf.directions.as_deref()?;
         let (cell, density) = tree.pdf_in_cell(cylinder::of_direction(d));
         Some(leaf.fluence * UNIFORM * tree.grid[cell] * CELLS as f32 * density)
+    }
+
+    fn outlook(&self, p: Vec3, n: Vec3) -> Option<Outlook> {
+        self.leaves[self.tree.leaf(self.tree.cell(p)).0 as usize].outlooks[side(n)]
     }
 
     fn validate(&self) -> Result<(), String> {

@@ -5,7 +5,7 @@
 //! | `u64`, `u32`, `u16` | records taken in, iterations, whether the limit of memory was reached |
 //! | | the tree over space: number of nodes, two children each |
 //! | `u32` | trees over directions, then each: shape (number of nodes, roots, four children each), parts of the flux |
-//! | | cells of space, one more than nodes: which tree over directions (0: none), probability of the guide, fluence, records, the descent that learns the probability, shape of the sums, and the sums unless all are 0 |
+//! | | cells of space, one more than nodes: which tree over directions (0: none), probability of the guide, fluence, records, the descent that learns the probability, shape of the sums, and the sums unless all are 0, what scattering brings |
 //!
 //! Cells that share a tree over directions still do afterwards.
 
@@ -13,6 +13,7 @@ use super::Settings;
 use super::field::{Field, Leaf};
 use super::learner::{Cell, Learner};
 use super::mixing::Mixing;
+use super::outlook;
 use super::quadtree::{MOST_LEVELS, Quadtree, Sums};
 use super::spatial::SpatialTree;
 use lucerna_core::interfaces::{FactValue, GuideFact, GuideField};
@@ -50,6 +51,7 @@ impl Learner {
             to.f64(cell.count);
             cell.mixing.pack(&mut to);
             cell.sums.pack(&mut to);
+            outlook::pack(&cell.outlooks, &leaf.outlooks, &mut to);
         }
         to.0
     }
@@ -83,8 +85,9 @@ impl Learner {
             }
             let mixing = Mixing::unpack(&mut from)?;
             let sums = Sums::unpack(&mut from)?;
-            leaves.push(Leaf { directions: directions.clone(), p_guide, fluence });
-            cells.push(Cell { sums, count, mixing, directions, fluence });
+            let (outlooks, known) = outlook::unpack(&mut from)?;
+            leaves.push(Leaf { directions: directions.clone(), p_guide, fluence, outlooks: known });
+            cells.push(Cell { sums, count, mixing, directions, fluence, outlooks });
         }
         from.end()?;
         let field = Arc::new(Field { tree: tree.clone(), leaves, cosine: settings.cosine });

@@ -19,10 +19,11 @@
 use super::cylinder;
 use super::field::{Field, Leaf};
 use super::mixing::Mixing;
+use super::outlook::{SIDES, Totals, side};
 use super::quadtree::{Quadtree, Refinement, Sums};
 use super::spatial::SpatialTree;
 use super::{DirectionalFilter, Settings, SpatialFilter};
-use lucerna_core::interfaces::{GuideFact, GuideField, GuideLearner, GuideRecord, mix};
+use lucerna_core::interfaces::{GuideFact, GuideField, GuideLearner, GuideRecord, VertexRecord, mix};
 use lucerna_core::math::Aabb;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -53,6 +54,7 @@ pub(super) struct Cell {
     /// What was learnt before.
     pub directions: Option<Arc<Quadtree>>,
     pub fluence: f32,
+    pub outlooks: [Totals; SIDES],
 }
 
 /// A record's part in a cell: which cell, tile and record, and how much of it.
@@ -73,7 +75,7 @@ impl Learner {
     }
 
     /// Where the record goes, with the part of it in each cell.
-    fn place(&self, record: &GuideRecord, number: u64, mut put: impl FnMut(u32, f32)) {
+    fn place(&self, record: &GuideRecord, number: u64, put: &mut dyn FnMut(u32, f32)) {
         const EDGE: u32 = 1 << 20;
         let cell = self.tree.cell(record.p);
         let (leaf, depth) = self.tree.leaf(cell);
@@ -95,7 +97,7 @@ impl Learner {
     }
 
     /// All parts of all records, ordered by cell, then by tile and record.
-    fn parts(&self, tiles: &[Vec<GuideRecord>]) -> Vec<Part> {
+    fn parts<T: Sync>(&self, tiles: &[Vec<T>], place: impl Fn(&T, u64, &mut dyn FnMut(u32, f32)) + Sync) -> Vec<Part> {
         let numbered = tiles.iter().scan(self.taken, |next, tile| {
             let first = *next;
             *next += tile.len() as u64;
@@ -110,7 +112,7 @@ impl Learner {
                 for (index, record) in records.iter().enumerate() {
                     let (tile, number) = (tile as u32, firsts[tile] + index as u64);
                     let record_index = index as u32;
-                    self.place(record, number, |cell, share| {
+                    place(record, number, &mut |cell, share| {
                         parts.push(Part { cell, tile, record: record_index, share })
                     });
                 }
@@ -156,6 +158,7 @@ impl Learner {
         self.tree.split(wanted, |old, _| {
             let mut cells = cells.borrow_mut();
             cells[old as usize].count *= 0.5;
+            cells[old as usize].outlooks.iter_mut().for_each(Totals::halve);
             let half = cells[old as usize].clone();
             cells.push(half);
         });
@@ -178,19 +181,25 @@ impl Learner {
     }
 }
 
+/// Each cell that has parts, with them.
+fn filled<'a>(cells: &'a mut [Cell], parts: &'a [Part]) -> Vec<(&'a mut Cell, &'a [Part])> {
+    let by_cell: Vec<&[Part]> = parts.chunk_by(|a, b| a.cell == b.cell).collect();
+    let mut filled: Vec<(&mut Cell, &[Part])> = Vec::with_capacity(by_cell.len());
+    let mut rest = cells;
+    let mut passed = 0;
+    for parts in by_cell {
+        let (_, from) = std::mem::take(&mut rest).split_at_mut(parts[0].cell as usize - passed);
+        let Some((cell, after)) = from.split_first_mut() else { break };
+        (rest, passed) = (after, parts[0].cell as usize + 1);
+        filled.push((cell, parts));
+    }
+    filled
+}
+
 impl GuideLearner for Learner {
     fn learn(&mut self, tiles: &[Vec<GuideRecord>]) {
-        let parts = self.parts(tiles);
-        let by_cell: Vec<&[Part]> = parts.chunk_by(|a, b| a.cell == b.cell).collect();
-        let mut filled: Vec<(&mut Cell, &[Part])> = Vec::with_capacity(by_cell.len());
-        let mut rest = &mut self.cells[..];
-        let mut passed = 0;
-        for parts in by_cell {
-            let (_, from) = std::mem::take(&mut rest).split_at_mut(parts[0].cell as usize - passed);
-            let Some((cell, after)) = from.split_first_mut() else { break };
-            (rest, passed) = (after, parts[0].cell as usize + 1);
-            filled.push((cell, parts));
-        }
+        let parts = self.parts(tiles, |record, number, put| self.place(record, number, put));
+        let filled = filled(&mut self.cells, &parts);
         let (filter, learns_mixing) = (self.settings.directional_filter, self.settings.p_guide.is_none());
         filled.into_par_iter().for_each(|(cell, parts)| {
             for part in parts {
@@ -202,6 +211,18 @@ impl GuideLearner for Learner {
             }
         });
         self.taken += tiles.iter().map(|tile| tile.len() as u64).sum::<u64>();
+    }
+
+    fn learn_outlook(&mut self, tiles: &[Vec<VertexRecord>]) {
+        let parts = self.parts(tiles, |record, _, put| put(self.tree.leaf(self.tree.cell(record.p)).0, 1.0));
+        let alone = !self.settings.directions;
+        filled(&mut self.cells, &parts).into_par_iter().for_each(|(cell, parts)| {
+            for part in parts {
+                let record = &tiles[part.tile as usize][part.record as usize];
+                cell.outlooks[side(record.n)].add(record);
+            }
+            cell.count += if alone { parts.len() as f64 } else { 0.0 };
+        });
     }
 
     fn refine(&mut self, spp: u32) {
@@ -219,6 +240,7 @@ impl GuideLearner for Learner {
             directions: cell.directions.clone(),
             p_guide: p_guide.unwrap_or_else(|| cell.mixing.p_guide()),
             fluence: cell.fluence,
+            outlooks: std::array::from_fn(|side| cell.outlooks[side].outlook()),
         };
         let leaves = self.cells.iter().map(leaf).collect();
         self.field = Arc::new(Field { tree: self.tree.clone(), leaves, cosine: self.settings.cosine });

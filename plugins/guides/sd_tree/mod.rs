@@ -44,6 +44,7 @@ mod field;
 mod kept;
 mod learner;
 mod mixing;
+mod outlook;
 mod quadtree;
 mod spatial;
 
@@ -110,6 +111,8 @@ struct Settings {
     p_guide: Option<f32>,
     cosine: bool,
     max_bytes: usize,
+    /// Whether directions are learnt; else only what scattering brings.
+    directions: bool,
 }
 
 fn build(p: &Properties<'_>) -> Built<dyn Guide> {
@@ -130,6 +133,7 @@ fn build(p: &Properties<'_>) -> Built<dyn Guide> {
         p_guide: p.float_opt("p_guide").map(|p| p.min(MOST_GUIDED)),
         cosine: p.choice("product") == "cosine",
         max_bytes: (p.double("max_memory") * f64::from(1 << 20)) as usize,
+        directions: true,
     };
     let training = Training {
         startup: number("startup"),
@@ -157,6 +161,34 @@ struct SdTree {
     training: Training,
 }
 
+/// Records after which a cell of space is halved where nothing but outlooks is learnt.
+const OUTLOOK_THRESHOLD: f64 = 500.0;
+
+/// The tree over space alone, for roulette of paths that are not guided. All samples count alike, since none is guided
+/// worse than others.
+pub(crate) fn outlook_alone() -> Arc<dyn Guide> {
+    let settings = Settings {
+        spatial_threshold: OUTLOOK_THRESHOLD,
+        directional_threshold: 1.0,
+        depth: 0,
+        spatial_filter: SpatialFilter::Nearest,
+        directional_filter: DirectionalFilter::Nearest,
+        p_guide: Some(0.0),
+        cosine: false,
+        max_bytes: 64 << 20,
+        directions: false,
+    };
+    let training = Training {
+        startup: 4,
+        ending: Ending::Doubling,
+        combination: Combination::All,
+        emitter_sampling: EmitterSampling::Always,
+        learn_direct: true,
+        least_roughness: 0.0,
+    };
+    Arc::new(SdTree { settings, training })
+}
+
 impl Guide for SdTree {
     fn start(&self, bounds: Aabb) -> Box<dyn GuideLearner> {
         Box::new(Learner::new(self.settings, bounds))
@@ -167,7 +199,7 @@ impl Guide for SdTree {
     }
 
     fn kept_as(&self) -> Option<&'static str> {
-        Some(PLUGIN.name)
+        Some(if self.settings.directions { PLUGIN.name } else { "outlook" })
     }
 
     fn recall(&self, bounds: Aabb, saved: &[u8]) -> Result<Box<dyn GuideLearner>> {

@@ -8,7 +8,7 @@
 //! A guide never stands alone. Directions come from the mixture of the guide and the BSDF, and the probability of the
 //! guide is at most [`MOST_GUIDED`], so that whatever a field has learnt, right or wrong, no light is lost.
 
-use super::{Arena, SurfaceHit};
+use super::{Arena, Outlook, SurfaceHit};
 use crate::io::{IoError, Result};
 use crate::math::{Aabb, Vec2, Vec3};
 use std::sync::Arc;
@@ -66,9 +66,20 @@ pub enum Ending {
     Variance,
 }
 
+/// What is learnt.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Subjects {
+    /// Where light comes from, so that paths are guided: [`GuideRecord`]s.
+    pub directions: bool,
+    /// What scattering brings, so that roulette can decide: [`VertexRecord`]s.
+    pub outlook: bool,
+}
+
 /// What becomes of the pictures of the iterations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Combination {
+    /// All samples count alike.
+    All,
     /// The last four are weighted by inverse mean variance.
     InverseVariance,
     /// Only the last one is kept.
@@ -90,6 +101,9 @@ pub enum EmitterSampling {
 pub trait GuideLearner: Send {
     /// Takes in the records of some tiles, in the order of the tiles.
     fn learn(&mut self, tiles: &[Vec<GuideRecord>]);
+
+    /// Takes in what the vertices in some tiles have scattered, in the order of the tiles.
+    fn learn_outlook(&mut self, _tiles: &[Vec<VertexRecord>]) {}
 
     /// Ends an iteration of so many samples per pixel: [`field`](Self::field) now has what was taken in.
     fn refine(&mut self, spp: u32);
@@ -142,6 +156,12 @@ pub trait GuideField: Send + Sync {
     /// The radiance that arrives at a point from world direction `d`, roughly; `None` where nothing is known.
     fn incident(&self, p: Vec3, d: Vec3) -> Option<f32>;
 
+    /// What scattering at a point brings, on the side of a surface to which unit normal `n` points; `None` where too
+    /// little is known.
+    fn outlook(&self, _p: Vec3, _n: Vec3) -> Option<Outlook> {
+        None
+    }
+
     /// Checks everything that must hold of the structure.
     ///
     /// # Errors
@@ -181,6 +201,19 @@ pub struct GuideRecord {
     pub pdf_guide: f32,
     /// How the direction was found.
     pub kind: RecordKind,
+}
+
+/// What one scattering at a vertex has brought: see [`Outlook`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VertexRecord {
+    /// The vertex.
+    pub p: Vec3,
+    /// Unit normal on the side that light is scattered from.
+    pub n: Vec3,
+    /// Luminance of the estimate of the radiance scattered, over that of the albedo.
+    pub light: f32,
+    /// Rays that it took.
+    pub cost: f32,
 }
 
 /// How a recorded direction was found.

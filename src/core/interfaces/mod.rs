@@ -21,6 +21,7 @@ mod guide;
 mod integrator;
 mod light_sampler;
 mod rfilter;
+mod roulette;
 mod sampler;
 mod sensor;
 mod shape;
@@ -32,11 +33,12 @@ pub use emitter::{Emitter, EmitterFlags, LightBounds, LightPoint, LightSample};
 pub use film::{ComponentFormat, FileFormat, Film, FilmSettings, PixelFormat};
 pub use guide::{
     Combination, EmitterSampling, Ending, FactValue, Guide, GuideFact, GuideField, GuideLearner, GuideRecord,
-    GuidedDirections, MOST_GUIDED, RecordKind, Training,
+    GuidedDirections, MOST_GUIDED, RecordKind, Subjects, Training, VertexRecord,
 };
 pub use integrator::{Integrator, Radiance, RadianceEstimator};
 pub use light_sampler::{Light, LightSampler, LightSelection, LightVertex, long_number};
 pub use rfilter::Rfilter;
+pub use roulette::{Goal, LEAST_SURVIVAL, MOST_BRANCHES, Outlook, PathState, Roulette, continuations};
 pub use sampler::{Sampler, mix, stream};
 pub use sensor::{CameraRay, Sensor};
 pub use shape::{AreaSample, Shape};

@@ -34,6 +34,11 @@ const ENOUGH: u32 = 4;
 pub struct Moments(Vec<(IVec2, f64, f64)>);
 
 impl Moments {
+    /// Pixels with the sum of their samples' luminance and of its square.
+    pub fn iter(&self) -> impl Iterator<Item = (IVec2, f64, f64)> {
+        self.0.iter().copied()
+    }
+
     /// Adds a sample; those of a pixel follow each other.
     #[inline]
     pub fn add(&mut self, pixel: IVec2, value: Radiance) {
@@ -99,10 +104,10 @@ impl Iterations {
 
     /// The samples that follow belong to another iteration.
     pub fn begin(&mut self) {
-        let kept = match self.policy {
-            Combination::InverseVariance => KEPT,
-            Combination::Last => 1,
-        };
+        if self.policy == Combination::All && !self.kept.is_empty() {
+            return;
+        }
+        let kept = self.most_kept();
         // While the new one is incomplete, the last complete ones all count.
         while self.kept.len() > kept {
             self.kept.pop_front();
@@ -132,10 +137,7 @@ impl Iterations {
 
     /// Ends the iteration under way: from now on the oldest no longer counts.
     pub fn complete(&mut self) {
-        let kept = match self.policy {
-            Combination::InverseVariance => KEPT,
-            Combination::Last => 1,
-        };
+        let kept = self.most_kept();
         while self.kept.len() > kept {
             self.kept.pop_front();
         }
@@ -147,12 +149,19 @@ impl Iterations {
         Some(0.5 * (even + odd))
     }
 
+    fn most_kept(&self) -> usize {
+        match self.policy {
+            Combination::InverseVariance => KEPT,
+            Combination::All | Combination::Last => 1,
+        }
+    }
+
     /// Weights of the iterations' means in both halves; they sum to 1.
     fn weights(&self) -> Vec<[f64; 2]> {
         let sampled: Vec<&Iteration> = self.kept.iter().collect();
         let by_count = || sampled.iter().map(|i| [f64::from(i.spp); 2]).collect::<Vec<_>>();
         let mut weights = match self.policy {
-            Combination::Last => {
+            Combination::All | Combination::Last => {
                 let last = sampled.iter().rposition(|i| i.spp > 0);
                 (0..sampled.len()).map(|i| [f64::from(u8::from(Some(i) == last)); 2]).collect()
             }

@@ -1,7 +1,7 @@
 //! What a path notes on its way, and what it knows about its vertices in the end.
 
 use crate::color::Rgb;
-use crate::interfaces::{GuideRecord, RecordKind};
+use crate::interfaces::{GuideRecord, RecordKind, Subjects, VertexRecord};
 use crate::math::Vec3;
 
 /// A vertex at which a path was scattered.
@@ -36,28 +36,67 @@ struct Link {
     boost: f32,
 }
 
-/// The notes of paths: a chain of vertices for the one under way, and the records of those that have ended.
+/// A vertex from which branches go on, one after the other.
+struct Fork {
+    /// Links behind it.
+    behind: usize,
+    /// Branches that have not ended.
+    left: u32,
+    /// What each counts for.
+    share: f32,
+    /// What those that have ended scattered, times the share.
+    sum: Rgb,
+    /// Rays traced before the branch under way.
+    rays: u32,
+    /// Where it is.
+    place: Place,
+}
+
+/// A vertex as far as what it scatters depends on it.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// The vertex.
+    pub p: Vec3,
+    /// Unit normal on the side that light is scattered from.
+    pub n: Vec3,
+    /// Its albedo.
+    pub albedo: Rgb,
+}
+
+/// The notes of a tile's paths: for the sample under way a chain of vertices with its forks, and the records of those that
+/// have ended.
 ///
 /// What a vertex receives is put together from the far end: it is what the ray met, and what the next vertex scattered.
 /// So nothing is divided by a throughput, which may be tiny.
 #[derive(Default)]
 pub struct Notebook {
     links: Vec<Link>,
+    forks: Vec<Fork>,
     /// Light of sampled emitters at the vertex whose direction is not known yet.
     direct: Rgb,
     records: Vec<GuideRecord>,
+    vertices: Vec<VertexRecord>,
     learn_direct: bool,
+    subjects: Subjects,
 }
 
 impl Notebook {
     /// An empty one. `learn_direct` says whether light counts that emitter sampling finds too.
-    pub fn new(learn_direct: bool) -> Self {
-        Notebook { learn_direct, ..Notebook::default() }
+    pub fn new(learn_direct: bool, subjects: Subjects) -> Self {
+        Notebook { learn_direct, subjects, ..Notebook::default() }
     }
 
     /// The records of all paths, in their order.
-    pub fn into_records(self) -> Vec<GuideRecord> {
-        self.records
+    pub fn into_records(self) -> (Vec<GuideRecord>, Vec<VertexRecord>) {
+        (self.records, self.vertices)
+    }
+
+    /// The vertex being visited scatters light along `count` branches, each of which counts `share`; `rays` have been
+    /// traced so far.
+    #[inline]
+    pub fn forked(&mut self, place: Place, count: u32, share: f32, rays: u32) {
+        let behind = self.links.len();
+        self.forks.push(Fork { behind, left: count, share, sum: Rgb::BLACK, rays, place });
     }
 
     /// Light of a sampled emitter that the vertex being visited scatters towards the one before.
@@ -90,38 +129,58 @@ impl Notebook {
         }
     }
 
-    /// The path has ended.
-    pub fn end(&mut self) {
+    /// The path, or the branch under way, has ended; `rays` have been traced so far.
+    pub fn end(&mut self, rays: u32) {
         // Scattered by a vertex whose further direction is unknown: the path ended there.
         let mut scattered = std::mem::replace(&mut self.direct, Rgb::BLACK);
-        while let Some(Link { at, direct, met, met_alone, boost }) = self.links.pop() {
-            let arriving = (met + scattered) * boost;
-            if let Some(kind) = at.kind {
-                let learnt = if self.learn_direct { arriving } else { (met_alone + scattered) * boost };
-                let product = (at.weight * learnt).mean();
-                let radiance = learnt.mean();
-                if radiance.is_finite() && product.is_finite() && at.pdf > 0.0 && at.pdf.is_finite() {
-                    let Scattering { p, d, pdf, pdf_bsdf, pdf_guide, .. } = at;
-                    self.records.push(GuideRecord {
-                        p,
-                        d,
-                        radiance,
-                        scattered: product,
-                        pdf,
-                        pdf_bsdf,
-                        pdf_guide,
-                        kind,
-                    });
-                }
+        loop {
+            let behind = self.forks.last().map_or(0, |fork| fork.behind);
+            while self.links.len() > behind
+                && let Some(link) = self.links.pop()
+            {
+                scattered = self.read(&link, scattered);
             }
-            scattered = direct + at.weight * arriving;
+            let Some(fork) = self.forks.last_mut() else { return };
+            let Place { p, n, albedo } = fork.place;
+            let light = scattered.luminance() / albedo.luminance();
+            if light.is_finite() && light >= 0.0 {
+                self.vertices.push(VertexRecord { p, n, light, cost: (rays - fork.rays) as f32 });
+            }
+            fork.sum += scattered * fork.share;
+            fork.left = fork.left.saturating_sub(1);
+            fork.rays = rays;
+            if fork.left > 0 {
+                return;
+            }
+            scattered = fork.sum;
+            self.forks.pop();
         }
+    }
+
+    /// Records what a vertex received, if the next one scattered that much, and gives what it scattered itself.
+    fn read(&mut self, link: &Link, beyond: Rgb) -> Rgb {
+        let Link { at, direct, met, met_alone, boost } = *link;
+        let arriving = (met + beyond) * boost;
+        if let Some(kind) = at.kind
+            && self.subjects.directions
+        {
+            let learnt = if self.learn_direct { arriving } else { (met_alone + beyond) * boost };
+            let scattered = (at.weight * learnt).mean();
+            let radiance = learnt.mean();
+            if radiance.is_finite() && scattered.is_finite() && at.pdf > 0.0 && at.pdf.is_finite() {
+                let Scattering { p, d, pdf, pdf_bsdf, pdf_guide, .. } = at;
+                self.records.push(GuideRecord { p, d, radiance, scattered, pdf, pdf_bsdf, pdf_guide, kind });
+            }
+        }
+        direct + at.weight * arriving
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const DIRECTIONS: Subjects = Subjects { directions: true, outlook: false };
 
     fn vertex(weight: f32) -> Scattering {
         let kind = Some(RecordKind::Unguided);
@@ -142,7 +201,7 @@ mod tests {
         for (learn_direct, expected) in
             [(true, [5.0, 9.0, 1.0 + 0.5 * 9.0 + 2.0]), (false, [0.0, 8.0, 1.0 + 0.5 * 9.0])]
         {
-            let mut book = Notebook::new(learn_direct);
+            let mut book = Notebook::new(learn_direct, DIRECTIONS);
             book.direct(Rgb::splat(7.0));
             book.scattered(vertex(3.0));
             book.met(Rgb::splat(2.0), false);
@@ -152,31 +211,63 @@ mod tests {
             book.met(Rgb::splat(0.25), false);
             book.scattered(vertex(0.4));
             book.met(Rgb::splat(5.0), false);
-            book.end();
-            let found: Vec<f32> = book.into_records().iter().map(|r| r.radiance).collect();
+            book.end(0);
+            let found: Vec<f32> = book.into_records().0.iter().map(|r| r.radiance).collect();
             assert_eq!(found, expected, "{learn_direct}");
         }
     }
 
     #[test]
     fn light_that_only_scattering_finds_is_always_learnt() {
-        let mut book = Notebook::new(false);
+        let mut book = Notebook::new(false, DIRECTIONS);
         book.scattered(vertex(1.0));
         book.met(Rgb::splat(2.0), true);
-        book.end();
-        assert_eq!(book.into_records()[0].radiance, 2.0);
+        book.end(0);
+        assert_eq!(book.into_records().0[0].radiance, 2.0);
     }
 
     /// One path does not leave anything to the next.
     #[test]
     fn paths_are_apart() {
-        let mut book = Notebook::new(true);
+        let mut book = Notebook::new(true, DIRECTIONS);
         book.scattered(vertex(1.0));
         book.direct(Rgb::splat(3.0));
-        book.end();
+        book.end(0);
         book.scattered(vertex(1.0));
-        book.end();
-        let found: Vec<f32> = book.into_records().iter().map(|r| r.radiance).collect();
+        book.end(0);
+        let found: Vec<f32> = book.into_records().0.iter().map(|r| r.radiance).collect();
         assert_eq!(found, [3.0, 0.0]);
+    }
+
+    /// A path that splits in two, one branch of which splits again: what each vertex scattered, counted by hand.
+    #[test]
+    fn branches_count_their_share() {
+        const OUTLOOK: Subjects = Subjects { directions: true, outlook: true };
+        let place = Place { p: Vec3::ZERO, n: Vec3::Z, albedo: Rgb::splat(0.5) };
+        let mut book = Notebook::new(true, OUTLOOK);
+        book.forked(place, 1, 1.0, 1);
+        book.direct(Rgb::splat(1.0));
+        book.scattered(vertex(0.5));
+        book.forked(place, 2, 0.25, 3);
+        book.direct(Rgb::splat(2.0));
+        book.scattered(vertex(1.0));
+        book.met(Rgb::splat(6.0), false);
+        book.forked(place, 3, 0.5, 5);
+        for i in 0..3 {
+            book.direct(Rgb::splat(4.0));
+            book.end(6 + i);
+        }
+        // The other branch is lost.
+        book.end(10);
+        let (records, vertices) = book.into_records();
+        // The third vertex scattered 4 thrice, half of it counts; the second 2 + 6 + 6, and nothing.
+        let light: Vec<f32> = vertices.iter().map(|v| 0.5 * v.light).collect();
+        for (found, expected) in light.iter().zip([4.0, 4.0, 4.0, 14.0, 0.0, 1.0 + 0.5 * 0.25 * 14.0]) {
+            assert!((found / expected - 1.0).abs() < 1e-6 || *found == expected, "{light:?}");
+        }
+        let cost: Vec<f32> = vertices.iter().map(|v| v.cost).collect();
+        assert_eq!(cost, [1.0, 1.0, 1.0, 5.0, 2.0, 9.0]);
+        let radiance: Vec<f32> = records.iter().map(|r| r.radiance).collect();
+        assert_eq!(radiance, [12.0, 3.5]);
     }
 }

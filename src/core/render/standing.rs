@@ -1,6 +1,7 @@
 //! Where a guided run stands between two passes: enough to go on from, also in another process.
 
 use super::combine::Iterations;
+use super::estimates::Estimates;
 use super::{FilmStore, GuideFile, RenderContext, RenderError, Report};
 use crate::interfaces::{Guide, GuideLearner};
 use crate::io::limits::Cursor;
@@ -52,6 +53,7 @@ pub(super) struct Standing {
     pub report: Report,
     pub pictures: Iterations,
     pub learner: Box<dyn GuideLearner>,
+    pub estimates: Estimates,
 }
 
 impl Standing {
@@ -86,7 +88,8 @@ impl Standing {
         };
         let empty = FilmStore::new(cx.store.size(), cx.store.aovs().to_vec());
         let pictures = Iterations::new(&empty, guide.training().combination);
-        Ok(Standing { course, report: Report::default(), pictures, learner })
+        let estimates = Estimates::new(cx.store.size());
+        Ok(Standing { course, report: Report::default(), pictures, learner, estimates })
     }
 
     /// Writes it. `learner` is what was known at the end of the latest pass, `report` what was told then.
@@ -101,6 +104,7 @@ impl Standing {
         }
         report.pack(seconds, to);
         self.pictures.pack(to);
+        self.estimates.pack(to);
         to.block(learner);
     }
 
@@ -124,8 +128,10 @@ impl Standing {
         let empty = FilmStore::new(cx.store.size(), cx.store.aovs().to_vec());
         let mut pictures = Iterations::new(&empty, guide.training().combination);
         pictures.unpack(from)?;
+        let mut estimates = Estimates::new(cx.store.size());
+        estimates.unpack(from)?;
         let learner = guide.recall(cx.scene.accel().bounds(), from.block("what was learnt")?)?;
         let course = Course { seed, startup, first, reach, taught, index, part: Some(part), pace, expected, enough };
-        Ok(Standing { course, report, pictures, learner })
+        Ok(Standing { course, report, pictures, learner, estimates })
     }
 }

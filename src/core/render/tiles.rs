@@ -36,7 +36,8 @@ pub(super) trait Tracer: Sync {
     /// As [`RadianceEstimator::wants_differentials`].
     fn wants_differentials(&self) -> bool;
 
-    /// As [`RadianceEstimator::radiance`].
+    /// As [`RadianceEstimator::radiance`], for a pixel relative to the crop window.
+    #[allow(clippy::too_many_arguments)]
     fn radiance(
         &self,
         scene: &Scene,
@@ -44,6 +45,7 @@ pub(super) trait Tracer: Sync {
         stream: &mut Stream<'_>,
         arena: &mut Arena,
         aovs: &mut [f32],
+        pixel: IVec2,
         notes: &mut Self::Notes,
     ) -> Radiance;
 
@@ -70,6 +72,7 @@ impl Tracer for &dyn RadianceEstimator {
         stream: &mut Stream<'_>,
         arena: &mut Arena,
         aovs: &mut [f32],
+        _pixel: IVec2,
         (): &mut (),
     ) -> Radiance {
         (**self).radiance(scene, camera, stream, arena, aovs)
@@ -369,7 +372,8 @@ fn sample_pixel<T: Tracer>(
         let beside = |offset: Vec2| cx.sensor.ray(film + offset, lens).ray;
         camera.offsets = Some([beside(Vec2::new(step.x, 0.0)), beside(Vec2::new(0.0, step.y))]);
     }
-    let mut value = tracer.radiance(cx.scene, &camera, stream, arena, aovs, notes);
+    let mut value =
+        tracer.radiance(cx.scene, &camera, stream, arena, aovs, pixel - cx.film.crop_offset.as_ivec2(), notes);
     value.rgb *= camera.weight;
     (offset, value)
 }

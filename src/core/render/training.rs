@@ -10,11 +10,14 @@
 
 use super::checkpoint::Keeper;
 use super::combine::Moments;
+use super::estimates::Estimates;
 use super::notebook::Notebook;
 use super::standing::{Course, Part, Standing};
 use super::tiles::{Run, Tracer, asked_spp, points};
 use super::{Budget, Learnt, RenderContext, RenderError, Report, SampleOrder};
-use crate::interfaces::{Arena, CameraRay, EmitterSampling, Ending, Guide, GuideField, Radiance, Training};
+use crate::interfaces::{
+    Arena, CameraRay, EmitterSampling, Ending, Goal, Guide, GuideField, Radiance, Subjects, Training,
+};
 use crate::sampling::Stream;
 use crate::scene::Scene;
 use glam::IVec2;
@@ -41,6 +44,10 @@ pub struct Guidance<'a> {
     pub sample_emitters: bool,
     /// Whether paths note what they find.
     pub learning: bool,
+    /// What the run is to learn, and goes by.
+    pub subjects: Subjects,
+    /// What is known of the pixel.
+    pub goal: Goal,
     /// Narrower lobes than this are not guided.
     pub least_roughness: f32,
 }
@@ -61,7 +68,8 @@ pub trait GuidedEstimator: Sync {
     ) -> Radiance;
 }
 
-/// Renders a guided estimator into the context's film until the budget is spent, and gives what was learnt.
+/// Renders a guided estimator into the context's film until the budget is spent, and gives what was learnt. `subjects`
+/// says what that is to be.
 ///
 /// # Errors
 /// If the context asks for what a run with learning cannot do, or a file that it names is of another run or scene.
@@ -69,6 +77,7 @@ pub fn render_guided(
     cx: &mut RenderContext<'_>,
     estimator: &dyn GuidedEstimator,
     guide: &dyn Guide,
+    subjects: Subjects,
 ) -> Result<(Report, Arc<dyn GuideField>), RenderError> {
     if cx.order != SampleOrder::PerSample {
         return Err(RenderError("random numbers in the reference's order and a guide exclude each other".to_owned()));
@@ -88,10 +97,11 @@ pub fn render_guided(
     let run = Run::new(cx, points.as_deref(), asked);
     run.goes_on(&at.report);
     let (training, earlier) = (guide.training(), at.report.seconds);
-    let mut lesson = Lesson { cx, run, estimator, training, keeper, at, asked, earlier, pace: 0.0, snapshot: None };
+    let mut lesson =
+        Lesson { cx, run, estimator, training, subjects, keeper, at, asked, earlier, pace: 0.0, snapshot: None };
     lesson.iterations();
     let Lesson { run, at, .. } = lesson;
-    let Standing { course, mut report, pictures, learner } = at;
+    let Standing { course, mut report, pictures, learner, .. } = at;
     run.conclude(&mut report, earlier);
     report.notes.splice(0..0, learner.summary());
     if let (Some(file), Some(name)) = (&cx.guide_file, guide.kept_as())
@@ -111,6 +121,7 @@ struct Lesson<'r, 'a> {
     run: Run<'r, 'a>,
     estimator: &'r dyn GuidedEstimator,
     training: Training,
+    subjects: Subjects,
     keeper: Option<Keeper<'a>>,
     at: Standing,
     /// Samples per pixel of the whole run.
@@ -263,17 +274,26 @@ impl Lesson<'_, '_> {
             EmitterSampling::Always => true,
         };
         let Training { learn_direct, least_roughness, .. } = self.training;
+        let subjects = self.subjects;
+        if subjects.outlook && start > 0 {
+            self.at.estimates.update(self.at.report.rays as f64 / self.at.report.samples as f64);
+        }
         let (field, learner) = (self.at.learner.field(), &mut self.at.learner);
-        let guidance = Guidance { field: &*field, sample_emitters, learning, least_roughness };
-        let guided = Guided { estimator: self.estimator, guidance, learn_direct };
+        let goal = Goal::default();
+        let guidance = Guidance { field: &*field, sample_emitters, learning, subjects, goal, least_roughness };
+        let guided = Guided { estimator: self.estimator, guidance, learn_direct, estimates: &self.at.estimates };
         // Notes are taken in as they come, so that those of a few tiles at most are held. A pass that is lost afterwards
         // has taught something nevertheless.
         let batch = (NOTED / (end - start) as usize).max(1);
         let hand_over = |notes: Vec<TileNotes>| {
             let (records, found): (Vec<_>, Vec<_>) =
                 notes.into_iter().map(|TileNotes { book, moments }| (book.into_records(), moments)).unzip();
-            if learning {
+            let (records, vertices): (Vec<_>, Vec<_>) = records.into_iter().unzip();
+            if learning && subjects.directions {
                 learner.learn(&records);
+            }
+            if learning && subjects.outlook {
+                learner.learn_outlook(&vertices);
             }
             moments.extend(found);
         };
@@ -282,6 +302,9 @@ impl Lesson<'_, '_> {
             return false;
         }
         self.at.pictures.extend(film, end - start, &moments);
+        if subjects.outlook {
+            self.at.estimates.extend(end - start, &moments);
+        }
         self.at.report.spp = if complete { end } else { start };
         complete
     }
@@ -298,13 +321,14 @@ struct Guided<'a> {
     estimator: &'a dyn GuidedEstimator,
     guidance: Guidance<'a>,
     learn_direct: bool,
+    estimates: &'a Estimates,
 }
 
 impl Tracer for Guided<'_> {
     type Notes = TileNotes;
 
     fn notes(&self) -> TileNotes {
-        TileNotes { book: Notebook::new(self.learn_direct), moments: Moments::default() }
+        TileNotes { book: Notebook::new(self.learn_direct, self.guidance.subjects), moments: Moments::default() }
     }
 
     fn wants_differentials(&self) -> bool {
@@ -319,9 +343,11 @@ impl Tracer for Guided<'_> {
         stream: &mut Stream<'_>,
         arena: &mut Arena,
         aovs: &mut [f32],
+        pixel: IVec2,
         notes: &mut TileNotes,
     ) -> Radiance {
-        self.estimator.radiance(scene, camera, stream, arena, aovs, self.guidance, &mut notes.book)
+        let guidance = Guidance { goal: self.estimates.goal(pixel), ..self.guidance };
+        self.estimator.radiance(scene, camera, stream, arena, aovs, guidance, &mut notes.book)
     }
 
     #[inline]

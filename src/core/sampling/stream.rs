@@ -1,6 +1,7 @@
 //! The numbers one pixel sample consumes.
 
 use super::Pcg32;
+use crate::interfaces::mix;
 use crate::math::{UVec2, Vec2};
 
 /// How many numbers a [`PointSet`] hands over per call.
@@ -55,6 +56,17 @@ impl<'a> Stream<'a> {
             next_single: 0,
             next_pair: 0,
         }))
+    }
+
+    /// What the [`branch`](Self::branch)es of a path that splits depend on; drawn from this stream.
+    pub fn key(&mut self) -> u64 {
+        let u2 = self.next_2d();
+        u64::from(u2.x.to_bits()) << 32 | u64::from(u2.y.to_bits())
+    }
+
+    /// Independent numbers for one branch of several.
+    pub fn branch(key: u64, index: u32) -> Self {
+        Stream::independent(Pcg32::new(mix(key), mix(key ^ u64::from(index).rotate_right(16))))
     }
 
     /// The next number.

@@ -265,6 +265,7 @@ impl<'a> Builder<'a> {
             Constructor::LightSampler(f) => f(&properties).map(Object::LightSampler),
             Constructor::Texture(f) => f(&properties).map(Object::Texture),
             Constructor::Guide(f) => f(&properties).map(Object::Guide),
+            Constructor::Roulette(f) => f(&properties).map(Object::Roulette),
             Constructor::Sensor(f) => {
                 f(&properties).and_then(|sensor| match (properties.film(), properties.sampler()) {
                     (Some(film), Some(sampler)) => Ok(Object::Sensor(BuiltSensor { sensor, film, sampler })),

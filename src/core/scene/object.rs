@@ -1,7 +1,7 @@
 //! A built object of any kind.
 
 use crate::interfaces::{
-    Bsdf, Emitter, Film, Guide, Integrator, LightSampler, Rfilter, Sampler, Sensor, Shape, Texture,
+    Bsdf, Emitter, Film, Guide, Integrator, LightSampler, Rfilter, Roulette, Sampler, Sensor, Shape, Texture,
 };
 use std::sync::Arc;
 
@@ -42,4 +42,5 @@ pub enum Object {
     Bsdf(Arc<dyn Bsdf>),
     Texture(Arc<dyn Texture>),
     Guide(Arc<dyn Guide>),
+    Roulette(Arc<dyn Roulette>),
 }

@@ -13,7 +13,7 @@ use super::param::{Default, Param, ParamType, Slot};
 use super::registry::{Failed, Plugin};
 use crate::color::{Rgb, ior, spectrum};
 use crate::interfaces::{
-    Bsdf, ColorSource, Film, Guide, Integrator, LightSampler, Rfilter, Sampler, ScalarSource, Shape, Texture,
+    Bsdf, ColorSource, Film, Guide, Integrator, LightSampler, Rfilter, Roulette, Sampler, ScalarSource, Shape, Texture,
 };
 use crate::math::{Transform, Vec3};
 use glam::DMat4;
@@ -386,6 +386,11 @@ impl<'a> Properties<'a> {
     /// The nested guide.
     pub fn guide(&self) -> Option<Arc<dyn Guide>> {
         self.of_kind(|o| if let Object::Guide(x) = o { Some(x.clone()) } else { None }).pop()
+    }
+
+    /// The nested decision whether paths go on.
+    pub fn roulette(&self) -> Option<Arc<dyn Roulette>> {
+        self.of_kind(|o| if let Object::Roulette(x) = o { Some(x.clone()) } else { None }).pop()
     }
 
     /// The nested film.

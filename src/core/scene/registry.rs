@@ -7,7 +7,7 @@ use super::description::ObjectKind;
 use super::param::Param;
 use super::properties::Properties;
 use crate::interfaces::{
-    Bsdf, Emitter, Film, Guide, Integrator, LightSampler, Rfilter, Sampler, Sensor, Shape, Texture,
+    Bsdf, Emitter, Film, Guide, Integrator, LightSampler, Rfilter, Roulette, Sampler, Sensor, Shape, Texture,
 };
 use std::sync::Arc;
 
@@ -33,6 +33,7 @@ pub enum Constructor {
     LightSampler(fn(&Properties<'_>) -> Built<dyn LightSampler>),
     Texture(fn(&Properties<'_>) -> Built<dyn Texture>),
     Guide(fn(&Properties<'_>) -> Built<dyn Guide>),
+    Roulette(fn(&Properties<'_>) -> Built<dyn Roulette>),
 }
 
 impl Constructor {
@@ -50,6 +51,7 @@ impl Constructor {
             Constructor::LightSampler(_) => ObjectKind::LightSampler,
             Constructor::Texture(_) => ObjectKind::Texture,
             Constructor::Guide(_) => ObjectKind::Guide,
+            Constructor::Roulette(_) => ObjectKind::Roulette,
         }
     }
 }

@@ -1,0 +1,101 @@
+//! What scattering has brought in a cell of space, apart for the sides that surfaces face there.
+
+use lucerna_core::interfaces::{Outlook, VertexRecord};
+use lucerna_core::io::limits::Cursor;
+use lucerna_core::io::sealed::Packer;
+use lucerna_core::io::{IoError, Result};
+use lucerna_core::math::Vec3;
+
+/// Sides that are told apart: both directions of the three axes.
+pub const SIDES: usize = 6;
+
+/// Records from which the means are believed.
+const ENOUGH: f64 = 32.0;
+
+/// The side to which a normal points: along its largest coordinate.
+#[inline]
+pub fn side(n: Vec3) -> usize {
+    let a = n.abs();
+    let (axis, x) = match (a.x >= a.y && a.x >= a.z, a.y >= a.z) {
+        (true, _) => (0, n.x),
+        (false, true) => (1, n.y),
+        (false, false) => (2, n.z),
+    };
+    2 * axis + usize::from(x < 0.0)
+}
+
+/// Sums over the records of a cell and side.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Totals {
+    count: f64,
+    light: f64,
+    square: f64,
+    cost: f64,
+}
+
+impl Totals {
+    /// Adds a record.
+    #[inline]
+    pub fn add(&mut self, record: &VertexRecord) {
+        let light = f64::from(record.light);
+        self.count += 1.0;
+        self.light += light;
+        self.square += light * light;
+        self.cost += f64::from(record.cost);
+    }
+
+    /// Gives half to another cell.
+    pub fn halve(&mut self) {
+        for sum in [&mut self.count, &mut self.light, &mut self.square, &mut self.cost] {
+            *sum *= 0.5;
+        }
+    }
+
+    fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// The means, if there are enough records.
+    pub fn outlook(&self) -> Option<Outlook> {
+        let mean = |sum: f64| (sum / self.count) as f32;
+        (self.count >= ENOUGH).then(|| Outlook {
+            light: mean(self.light),
+            square: mean(self.square),
+            cost: mean(self.cost),
+        })
+    }
+}
+
+/// Packs the sums of all sides, and what was known of them at the end of the last iteration: one bit for each that is
+/// there, then they.
+pub fn pack(totals: &[Totals; SIDES], known: &[Option<Outlook>; SIDES], to: &mut Packer) {
+    let bits = |is_there: [bool; SIDES]| is_there.iter().rev().fold(0, |bits, b| 2 * bits + u16::from(*b));
+    to.u16(bits(totals.map(|t| !t.is_empty())) | bits(known.map(|k| k.is_some())) << SIDES);
+    for Totals { count, light, square, cost } in totals.iter().filter(|t| !t.is_empty()) {
+        [count, light, square, cost].into_iter().for_each(|sum| to.f64(*sum));
+    }
+    for Outlook { light, square, cost } in known.iter().flatten() {
+        [light, square, cost].into_iter().for_each(|mean| to.f32(*mean));
+    }
+}
+
+/// Reads what was packed.
+///
+/// # Errors
+/// If it is not that.
+pub fn unpack(from: &mut Cursor<'_>) -> Result<([Totals; SIDES], [Option<Outlook>; SIDES])> {
+    const WHAT: &str = "what scattering brings";
+    let bits = from.u16(WHAT)?;
+    let (mut totals, mut known) = ([Totals::default(); SIDES], [None; SIDES]);
+    for (_, total) in totals.iter_mut().enumerate().filter(|(side, _)| bits >> side & 1 == 1) {
+        let (count, light, square, cost) = (from.f64(WHAT)?, from.f64(WHAT)?, from.f64(WHAT)?, from.f64(WHAT)?);
+        if [count, light, square, cost].iter().any(|sum| !(0.0..=f64::MAX).contains(sum)) {
+            return Err(IoError::new("a cell has sums that are no sums of light"));
+        }
+        *total = Totals { count, light, square, cost };
+    }
+    for (_, known) in known.iter_mut().enumerate().filter(|(side, _)| bits >> (SIDES + side) & 1 == 1) {
+        *known = Some(Outlook { light: from.f32(WHAT)?, square: from.f32(WHAT)?, cost: from.f32(WHAT)? });
+    }
+    Ok((totals, known))
+}

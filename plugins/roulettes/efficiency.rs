@@ -1,0 +1,56 @@
+//! `efficiency`: a path goes on, stops or splits as the picture's error per time asks for.
+//!
+//! | parameter | type | default | meaning |
+//! |---|---|---|---|
+//! | `factor` | float | 1 | times as many continuations |
+//!
+//! ```xml
+//! <integrator type="path">
+//!     <roulette type="efficiency"/>
+//! </integrator>
+//! ```
+
+use super::{limited, survival, unlearnt};
+use crate::guides::outlook_alone;
+use lucerna_core::color::Rgb;
+use lucerna_core::interfaces::{Guide, Outlook, PathState, Roulette};
+use lucerna_core::scene::{Built, Constructor, Param, Plugin, Properties};
+use std::sync::Arc;
+
+/// Table entry.
+pub const PLUGIN: Plugin = Plugin {
+    name: "efficiency",
+    aliases: &[],
+    summary: "paths end or split as error per time asks for",
+    params: &[&[Param::float("factor", 1.0, "times as many continuations").at_least(0.0)]],
+    build: Constructor::Roulette(build),
+};
+
+fn build(p: &Properties<'_>) -> Built<dyn Roulette> {
+    Ok(Arc::new(Efficiency { factor: p.float("factor") }))
+}
+
+struct Efficiency {
+    factor: f32,
+}
+
+impl Roulette for Efficiency {
+    fn teacher(&self) -> Option<Arc<dyn Guide>> {
+        Some(outlook_alone())
+    }
+
+    fn branches(&self, path: &PathState, albedo: Rgb, outlook: Option<Outlook>) -> f32 {
+        let Some(Outlook { light, square, cost }) = outlook else { return unlearnt(path) };
+        let scale = self.factor * path.goal.effort * (path.throughput * albedo).luminance() / path.goal.image;
+        let ends = scale * (square / cost).sqrt();
+        let splits = scale * ((square - light * light).max(0.0) / cost).sqrt();
+        if !(ends > 0.0 && ends.is_finite()) {
+            return unlearnt(path);
+        }
+        limited(path, if ends < 1.0 { ends } else { splits.max(1.0) })
+    }
+
+    fn survival(&self, path: &PathState, delta: bool) -> f32 {
+        if delta { survival(path.prospects, path.eta) } else { 1.0 }
+    }
+}
