@@ -3,12 +3,13 @@
 //! The kernel is compiled once for each way to decide ([`Directions`]); where nothing is learnt it is what it would be
 //! without any of this.
 
-use super::common::{Met, PathLimits, Scattered, find_surface, mis_weight, scattered, survival, weighted_emission};
+use super::common::{Met, PathLimits, Scattered, find_surface, mis_weight, scattered, weighted_emission};
+use super::decides::Decides;
 use super::lights::PickLights;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{
     Arena, Bxdf, BxdfSample, CameraRay, Goal, GuidedDirections, LightSample, Lobes, MOST_GUIDED, Outlook, PathState,
-    Radiance, RecordKind, Roulette, SurfaceHit, Transport, continuations,
+    Radiance, RecordKind, SurfaceHit, Transport, continuations,
 };
 use lucerna_core::math::{ONE_MINUS_EPSILON, Vec2, Vec3};
 use lucerna_core::render::{Guidance, Notebook, Place, Scattering};
@@ -356,49 +357,6 @@ impl<'a> Directions for Guided<'a> {
 /// Each channel, or this if it is less; also if it is no number.
 fn at_least(color: Rgb, least: f32) -> Rgb {
     Rgb::new(color.r.max(least), color.g.max(least), color.b.max(least))
-}
-
-/// What roulette decides.
-pub(super) trait Decides {
-    /// Whether paths may split, or end before they are scattered.
-    const BRANCHES: bool;
-
-    /// See [`Roulette::branches`].
-    fn branches(&self, path: &PathState, albedo: Rgb, outlook: Option<Outlook>) -> f32;
-
-    /// See [`Roulette::survival`].
-    fn survival(&self, path: &PathState, delta: bool) -> f32;
-}
-
-/// By the throughput, as the reference.
-pub(super) struct ByThroughput;
-
-impl Decides for ByThroughput {
-    const BRANCHES: bool = false;
-
-    #[inline(always)]
-    fn branches(&self, _path: &PathState, _albedo: Rgb, _outlook: Option<Outlook>) -> f32 {
-        1.0
-    }
-
-    #[inline(always)]
-    fn survival(&self, path: &PathState, _delta: bool) -> f32 {
-        survival(path.throughput, path.eta)
-    }
-}
-
-impl Decides for &dyn Roulette {
-    const BRANCHES: bool = true;
-
-    #[inline]
-    fn branches(&self, path: &PathState, albedo: Rgb, outlook: Option<Outlook>) -> f32 {
-        Roulette::branches(*self, path, albedo, outlook)
-    }
-
-    #[inline]
-    fn survival(&self, path: &PathState, delta: bool) -> f32 {
-        Roulette::survival(*self, path, delta)
-    }
 }
 
 /// Continuations of all splits of a camera sample together, at most.
