@@ -2,6 +2,7 @@
 
 mod aov;
 mod common;
+mod decides;
 mod depth;
 mod direct;
 mod lights;

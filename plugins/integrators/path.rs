@@ -24,8 +24,9 @@
 //! ```
 
 use super::common::{COMMON, PATH, PathLimits, timeout};
+use super::decides::ByThroughput;
 use super::lights::{ByScene, LIGHTS, Lights};
-use super::path_kernel::{ByThroughput, Guided, Unguided, trace};
+use super::path_kernel::{Guided, Unguided, trace};
 use crate::roulettes::ByAlbedo;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{Arena, CameraRay, Guide, Integrator, Radiance, RadianceEstimator, Roulette, Subjects};

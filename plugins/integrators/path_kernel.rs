@@ -3,12 +3,13 @@
 //! The kernel is compiled once for each way to decide ([`Directions`]); where nothing is learnt it is what it would be
 //! without any of this.
 
-use super::common::{Met, PathLimits, Scattered, find_surface, mis_weight, scattered, survival, weighted_emission};
+use super::common::{Met, PathLimits, Scattered, find_surface, mis_weight, scattered, weighted_emission};
+use super::decides::Decides;
 use super::lights::PickLights;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{
     Arena, Bxdf, BxdfSample, CameraRay, Goal, GuidedDirections, LightSample, Lobes, MOST_GUIDED, Outlook, PathState,
-    Radiance, RecordKind, Roulette, SurfaceHit, Transport, continuations,
+    Radiance, RecordKind, SurfaceHit, Transport, continuations,
 };
 use lucerna_core::math::{ONE_MINUS_EPSILON, Vec2, Vec3};
 use lucerna_core::render::{Guidance, Notebook, Place, Scattering};
@@ -36,7 +37,10 @@ pub(super) trait Directions {
     /// What the throughput, which is this, would be about if directions came from the BSDF; not less than it is.
     fn prospects(&self, throughput: Rgb) -> Rgb;
 
-    /// Goes back to a vertex, where the prospects were these.
+    /// What has to be known to go back to this vertex.
+    fn mark(&self) -> Rgb;
+
+    /// Goes back to a vertex where [`mark`](Self::mark) said this.
     fn resume(&mut self, prospects: Rgb);
 
     /// What is known of the pixel.
@@ -44,6 +48,9 @@ pub(super) trait Directions {
 
     /// Whether what scattering brings is learnt, so that paths may split or end before they are scattered.
     fn looks_ahead(&self) -> bool;
+
+    /// Whether notes are kept.
+    fn learns(&self) -> bool;
 
     /// What scattering at a vertex brings, as far as is known.
     fn outlook(&self, place: &Place) -> Option<Outlook>;
@@ -110,6 +117,11 @@ impl Directions for Unguided {
     }
 
     #[inline(always)]
+    fn mark(&self) -> Rgb {
+        Rgb::WHITE
+    }
+
+    #[inline(always)]
     fn resume(&mut self, _prospects: Rgb) {}
 
     #[inline(always)]
@@ -119,6 +131,11 @@ impl Directions for Unguided {
 
     #[inline(always)]
     fn looks_ahead(&self) -> bool {
+        false
+    }
+
+    #[inline(always)]
+    fn learns(&self) -> bool {
         false
     }
 
@@ -248,6 +265,11 @@ impl<'a> Directions for Guided<'a> {
     }
 
     #[inline]
+    fn mark(&self) -> Rgb {
+        self.prospects
+    }
+
+    #[inline]
     fn resume(&mut self, prospects: Rgb) {
         self.prospects = prospects;
     }
@@ -260,6 +282,11 @@ impl<'a> Directions for Guided<'a> {
     #[inline]
     fn looks_ahead(&self) -> bool {
         self.guidance.subjects.outlook
+    }
+
+    #[inline]
+    fn learns(&self) -> bool {
+        self.guidance.learning
     }
 
     #[inline]
@@ -330,49 +357,6 @@ impl<'a> Directions for Guided<'a> {
 /// Each channel, or this if it is less; also if it is no number.
 fn at_least(color: Rgb, least: f32) -> Rgb {
     Rgb::new(color.r.max(least), color.g.max(least), color.b.max(least))
-}
-
-/// What roulette decides.
-pub(super) trait Decides {
-    /// Whether paths may split, or end before they are scattered.
-    const BRANCHES: bool;
-
-    /// See [`Roulette::branches`].
-    fn branches(&self, path: &PathState, albedo: Rgb, outlook: Option<Outlook>) -> f32;
-
-    /// See [`Roulette::survival`].
-    fn survival(&self, path: &PathState, delta: bool) -> f32;
-}
-
-/// By the throughput, as the reference.
-pub(super) struct ByThroughput;
-
-impl Decides for ByThroughput {
-    const BRANCHES: bool = false;
-
-    #[inline(always)]
-    fn branches(&self, _path: &PathState, _albedo: Rgb, _outlook: Option<Outlook>) -> f32 {
-        1.0
-    }
-
-    #[inline(always)]
-    fn survival(&self, path: &PathState, _delta: bool) -> f32 {
-        survival(path.throughput, path.eta)
-    }
-}
-
-impl Decides for &dyn Roulette {
-    const BRANCHES: bool = true;
-
-    #[inline]
-    fn branches(&self, path: &PathState, albedo: Rgb, outlook: Option<Outlook>) -> f32 {
-        Roulette::branches(*self, path, albedo, outlook)
-    }
-
-    #[inline]
-    fn survival(&self, path: &PathState, delta: bool) -> f32 {
-        Roulette::survival(*self, path, delta)
-    }
 }
 
 /// Continuations of all splits of a camera sample together, at most.
@@ -456,47 +440,35 @@ pub(super) fn trace<'v, D: Directions<Here: 'v>, R: Decides>(
                 _ => directions.here(&hit, bxdf),
             };
             let lobes = bsdf.lobes();
-            if R::BRANCHES && directions.looks_ahead() && !resumes && lobes.is_smooth() {
+            // Whether the sample is transparent does not depend on what roulette decides.
+            let asked = depth > 0 && (found.alpha > 0.0 || !lobes.intersects(Lobes::NULL));
+            if R::BRANCHES
+                && directions.looks_ahead()
+                && !resumes
+                && lobes.is_smooth()
+                && (asked || directions.learns())
+            {
                 let place = Place { p: hit.p, n: hit.frame.n * 1f32.copysign(hit.wi.z), albedo: bxdf.albedo(hit.wi) };
-                let path = PathState {
-                    throughput,
-                    prospects: directions.prospects(throughput),
-                    eta,
-                    due: depth >= rr_depth,
-                    depth,
-                    goal: directions.goal(),
-                };
-                // Whether the sample is transparent does not depend on how it goes on from here.
-                let opaque = found.alpha > 0.0 || !lobes.intersects(Lobes::NULL);
-                let asked = depth > 0 && opaque;
-                let wanted = match asked {
-                    true => limited(roulette.branches(&path, place.albedo, directions.outlook(&place)), splits),
-                    false => 1.0,
-                };
-                let count = wanted as u32 + u32::from(u_left < wanted.fract());
+                let (mut wanted, mut count) = (1.0, 1);
                 if asked {
                     found.alpha = 1.0;
+                    let (prospects, goal) = (directions.prospects(throughput), directions.goal());
+                    let path = PathState { throughput, prospects, eta, due: depth >= rr_depth, depth, goal };
+                    wanted = limited(roulette.branches(&path, place.albedo, directions.outlook(&place)), splits);
+                    count = wanted as u32 + u32::from(u_left < wanted.fract());
+                    if count == 0 {
+                        break 'path;
+                    }
+                    splits += count - 1;
+                    throughput *= 1.0 / wanted;
                 }
-                if count == 0 {
-                    break 'path;
-                }
-                splits += count - 1;
-                throughput *= 1.0 / wanted;
                 directions.note_fork(place, count, 1.0 / wanted, found.rays);
                 if count > 1 {
                     let (left, key) = (Cell::new(count - 1), stream.key());
-                    let prospects = path.prospects * (1.0 / wanted);
-                    branch = Some(arena.alloc(Branch {
-                        hit,
-                        here,
-                        throughput,
-                        prospects,
-                        eta,
-                        depth,
-                        left,
-                        key,
-                        below: branch,
-                    }));
+                    let prospects = directions.mark();
+                    let below = branch;
+                    branch =
+                        Some(arena.alloc(Branch { hit, here, throughput, prospects, eta, depth, left, key, below }));
                 }
             }
             let from = lights.vertex(&hit, lobes);

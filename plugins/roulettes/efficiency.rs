@@ -1,8 +1,15 @@
 //! `efficiency`: a path goes on, stops or splits as the picture's error per time asks for.
 //!
+//! Efficiency-aware Russian roulette and splitting (Rath, Grittmann, Herholz, Weier, Slusallek 2022). With v the mean
+//! relative variance of a sample and c its mean cost in rays, both of the picture, a path of throughput t in a pixel of
+//! luminance i goes on from a vertex with the probability t/i · √(second moment / cost · c/v) of what scattering there has
+//! brought; where that is above 1, it splits into t/i · √(variance / cost · c/v). The variance is that among the
+//! branches of vertices that have split, not that among the vertices of a cell. Limits and learning are as in `adjoint`,
+//! which needs no such figures and is mostly faster.
+//!
 //! | parameter | type | default | meaning |
 //! |---|---|---|---|
-//! | `factor` | float | 1 | times as many continuations |
+//! | `factor` | float | 1 | times as many continuations as that |
 //!
 //! ```xml
 //! <integrator type="path">
@@ -40,10 +47,10 @@ impl Roulette for Efficiency {
     }
 
     fn branches(&self, path: &PathState, albedo: Rgb, outlook: Option<Outlook>) -> f32 {
-        let Some(Outlook { light, square, cost }) = outlook else { return unlearnt(path) };
+        let Some(Outlook { square, spread, cost, .. }) = outlook else { return unlearnt(path) };
         let scale = self.factor * path.goal.effort * (path.throughput * albedo).luminance() / path.goal.image;
         let ends = scale * (square / cost).sqrt();
-        let splits = scale * ((square - light * light).max(0.0) / cost).sqrt();
+        let splits = scale * (spread / cost).sqrt();
         if !(ends > 0.0 && ends.is_finite()) {
             return unlearnt(path);
         }

@@ -17,7 +17,7 @@ use std::process::ExitCode;
 /// Told at the end of the help.
 const EXAMPLES: &str = "\
 Methods: `path`, `direct`, `path:max_depth=4`, `path:sampler=sobol`, `path+guide=sd_tree`, `path+light_sampler=power`,
-`scene` (as the scene has it), `mitsuba:llvm_ad_rgb:path` (with the reference renderer), or a file such as
+`path+roulette=adjoint`, `scene` (as the scene has it), `mitsuba:llvm_ad_rgb:path` (with the reference renderer), or a file such as
 
     baseline = \"two bounces\"
     [[method]]
@@ -27,6 +27,7 @@ Methods: `path`, `direct`, `path:max_depth=4`, `path:sampler=sobol`, `path+guide
     sampler = \"multijitter\"
     light_sampler = \"light_tree\"
     # guide = \"sd_tree\"
+    # roulette = \"adjoint\"
     define = { power = \"2\" }            # the scene's $power
     # renderer = \"mitsuba:scalar_rgb\"
 

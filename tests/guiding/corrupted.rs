@@ -135,14 +135,14 @@ impl GuideField for Field {
     }
 
     fn outlook(&self, p: Vec3, n: Vec3) -> Option<Outlook> {
-        let all = |x| Some(Outlook { light: x, square: x, cost: x });
+        let all = |x| Some(Outlook { light: x, square: x, spread: x, cost: x });
         match &*self.spoils.outlook {
             "zero" => all(0.0),
             "huge" => all(1e30),
             "nan" => all(f32::NAN),
             "random" => {
                 let part = |i: u64| ((mix(key(p) ^ i) % 8) as f32 - 4.0).exp2();
-                Some(Outlook { light: part(1), square: part(2), cost: part(3) })
+                Some(Outlook { light: part(1), square: part(2), spread: part(3), cost: part(4) })
             }
             _ => self.inner.outlook(p, n),
         }

@@ -28,8 +28,8 @@
 //! the cells are small, which takes millions of samples. Small or short renders, and those whose noise comes from
 //! sampled lights or from caustics that are rarely found, gain nothing, and each sample costs a third to twice as much.
 //!
-//! Roulette begins at the integrator's `rr_depth`. Where light arrives after many bounces it ends paths that matter, and
-//! a larger `rr_depth` may pay.
+//! Roulette begins at the integrator's `rr_depth`. Where light arrives after many bounces it ends paths that matter:
+//! `<roulette type="adjoint"/>` beside the guide goes by what this tree has learnt, or a larger `rr_depth` may pay.
 //!
 //! What differs from the publications stands at the head of `learner.rs`.
 //!

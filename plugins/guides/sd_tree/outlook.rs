@@ -31,6 +31,9 @@ pub struct Totals {
     light: f64,
     square: f64,
     cost: f64,
+    /// Sum over vertices that split of the variance among their branches, and the number of them.
+    spread: f64,
+    splits: f64,
 }
 
 impl Totals {
@@ -42,11 +45,16 @@ impl Totals {
         self.light += light;
         self.square += light * light;
         self.cost += f64::from(record.cost);
+        if let Some(spread) = record.spread {
+            self.spread += f64::from(spread);
+            self.splits += 1.0;
+        }
     }
 
     /// Gives half to another cell.
     pub fn halve(&mut self) {
-        for sum in [&mut self.count, &mut self.light, &mut self.square, &mut self.cost] {
+        let Totals { count, light, square, cost, spread, splits } = self;
+        for sum in [count, light, square, cost, spread, splits] {
             *sum *= 0.5;
         }
     }
@@ -57,12 +65,15 @@ impl Totals {
 
     /// The means, if there are enough records.
     pub fn outlook(&self) -> Option<Outlook> {
-        let mean = |sum: f64| (sum / self.count) as f32;
-        (self.count >= ENOUGH).then(|| Outlook {
-            light: mean(self.light),
-            square: mean(self.square),
-            cost: mean(self.cost),
-        })
+        if self.count < ENOUGH {
+            return None;
+        }
+        let [light, square, cost] = [self.light, self.square, self.cost].map(|sum| sum / self.count);
+        // Part of the variance among all vertices is that they are different. Until splits have told how much: half.
+        let among_all = (square - light * light).max(0.0);
+        let spread = if self.splits >= ENOUGH { self.spread / self.splits } else { 0.5 * among_all };
+        let spread = spread.min(among_all) as f32;
+        Some(Outlook { light: light as f32, square: square as f32, spread, cost: cost as f32 })
     }
 }
 

@@ -214,6 +214,8 @@ pub struct VertexRecord {
     pub light: f32,
     /// Rays that it took.
     pub cost: f32,
+    /// Variance of `light` among the branches of a vertex that split, told with the last of them.
+    pub spread: Option<f32>,
 }
 
 /// How a recorded direction was found.

@@ -49,6 +49,8 @@ pub struct Outlook {
     pub light: f32,
     /// Mean of its square.
     pub square: f32,
+    /// Mean variance of what is scattered at the same vertex: what splitting lowers. Not more than that among all vertices.
+    pub spread: f32,
     /// Mean cost in rays.
     pub cost: f32,
 }

@@ -46,6 +46,8 @@ struct Fork {
     share: f32,
     /// What those that have ended scattered, times the share.
     sum: Rgb,
+    /// Number of those that have ended, sum and sum of squares of what they scattered as it is recorded.
+    ended: [f32; 3],
     /// Rays traced before the branch under way.
     rays: u32,
     /// Where it is.
@@ -96,7 +98,7 @@ impl Notebook {
     #[inline]
     pub fn forked(&mut self, place: Place, count: u32, share: f32, rays: u32) {
         let behind = self.links.len();
-        self.forks.push(Fork { behind, left: count, share, sum: Rgb::BLACK, rays, place });
+        self.forks.push(Fork { behind, left: count, share, sum: Rgb::BLACK, ended: [0.0; 3], rays, place });
     }
 
     /// Light of a sampled emitter that the vertex being visited scatters towards the one before.
@@ -143,11 +145,15 @@ impl Notebook {
             let Some(fork) = self.forks.last_mut() else { return };
             let Place { p, n, albedo } = fork.place;
             let light = scattered.luminance() / albedo.luminance();
-            if light.is_finite() && light >= 0.0 {
-                self.vertices.push(VertexRecord { p, n, light, cost: (rays - fork.rays) as f32 });
-            }
             fork.sum += scattered * fork.share;
             fork.left = fork.left.saturating_sub(1);
+            if light.is_finite() && light >= 0.0 {
+                let [count, sum, squares] = &mut fork.ended;
+                (*count, *sum, *squares) = (*count + 1.0, *sum + light, *squares + light * light);
+                let variance = (*squares - *sum * *sum / *count).max(0.0) / (*count - 1.0);
+                let spread = (fork.left == 0 && *count > 1.0 && variance.is_finite()).then_some(variance);
+                self.vertices.push(VertexRecord { p, n, light, cost: (rays - fork.rays) as f32, spread });
+            }
             fork.rays = rays;
             if fork.left > 0 {
                 return;
