@@ -9,9 +9,11 @@
 //!
 //! | parameter | type | default | meaning |
 //! |---|---|---|---|
-//! | `spatial_threshold` | float | 1000 | a cell of space is halved with more records than this times √(samples per pixel of the iteration) |
+//! | `spatial_threshold` | float | 500 | a cell of space is halved with more records than this times √(samples per pixel of the iteration) |
 //! | `directional_threshold` | float | 0.01 | a cell of directions is divided with more than this part of the flux |
 //! | `directional_depth` | integer | 20 | levels of quadtrees at most, from 3 to 20 |
+//! | `prior` | float | 8 | what larger cells of space have found counts as much as so many records, and so does, inside a cell of directions, light from everywhere; 0 as published |
+//! | `memory` | float | 0.5 | part of what was found that still counts an iteration later; 0 as published |
 //! | `spatial_filter` | string | stochastic | records go to the cell they lie in (`nearest`), to one in a box about it (`stochastic`), or to all of the `box` by volume |
 //! | `directional_filter` | string | box | records go to the directions they lie in (`nearest`), or to all in a `box` about them by area |
 //! | `p_guide` | float | unset | probability of the guide, limited to 0.95; learnt if unset |
@@ -19,7 +21,7 @@
 //! | `roughness_threshold` | float | 0.05 | narrower lobes than this are not guided |
 //! | `nee` | string | always | when lights are sampled: `never`, `kickstart` (the first 128 samples per pixel), `always` |
 //! | `direct` | boolean | true | light that emitter sampling also finds is learnt, times the weight of finding it by scattering |
-//! | `startup` | integer | 8 | iterations of one sample per pixel before those that double |
+//! | `startup` | integer | 8 | iterations of one sample per pixel before those that have as many samples as all before them |
 //! | `combination` | string | inverse_variance | which iterations make the picture: the last four by `inverse_variance`, or the `last` |
 //! | `max_memory` | float | 64 | MiB that the trees may take; then they stay coarser |
 //!
@@ -42,6 +44,7 @@ mod cylinder;
 mod field;
 mod learner;
 mod mixing;
+mod prior;
 mod quadtree;
 mod spatial;
 
@@ -57,10 +60,12 @@ pub const PLUGIN: Plugin = Plugin {
     aliases: &[],
     summary: "learns incident light in a tree over space and directions",
     params: &[&[
-        Param::float("spatial_threshold", 1000.0, "records after which a cell of space is halved").at_least(1.0),
+        Param::float("spatial_threshold", 500.0, "records after which a cell of space is halved").at_least(1.0),
         Param::float("directional_threshold", 0.01, "part of the flux above which a cell of directions is divided")
             .range(1e-6, 1.0),
         Param::int("directional_depth", 20, "levels of quadtrees at most").range(3.0, 20.0),
+        Param::float("prior", 8.0, "records that count as much as what larger cells around have found").at_least(0.0),
+        Param::float("memory", 0.5, "part of what was found that still counts an iteration later").range(0.0, 1.0),
         Param::choice("spatial_filter", &["nearest", "stochastic", "box"], "stochastic", "cells a record goes to"),
         Param::choice("directional_filter", &["nearest", "box"], "box", "directions a record goes to"),
         Param::float_opt("p_guide", "probability of the guide; learnt if unset").range(0.0, 1.0),
@@ -101,6 +106,10 @@ struct Settings {
     spatial_threshold: f64,
     directional_threshold: f64,
     depth: u32,
+    /// Records that what larger cells have found is worth.
+    prior: f64,
+    /// Part of what was found that still counts an iteration later.
+    memory: f64,
     spatial_filter: SpatialFilter,
     directional_filter: DirectionalFilter,
     p_guide: Option<f32>,
@@ -114,6 +123,8 @@ fn build(p: &Properties<'_>) -> Built<dyn Guide> {
         spatial_threshold: p.double("spatial_threshold"),
         directional_threshold: p.double("directional_threshold"),
         depth: number("directional_depth"),
+        prior: p.double("prior"),
+        memory: p.double("memory"),
         spatial_filter: match p.choice("spatial_filter") {
             "nearest" => SpatialFilter::Nearest,
             "box" => SpatialFilter::Box,

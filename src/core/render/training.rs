@@ -3,9 +3,10 @@
 //! Rendering is cut into iterations. In each, paths are guided by what the iterations before have taught, and note what
 //! they find; what a field gives does not change meanwhile. So every picture is unbiased, and has the same bits for any
 //! number of threads. First come some iterations of one sample per pixel, by which the field learns where paths go at
-//! all; then each has twice the samples of the one before. The last one takes all that is left of the budget, once the
-//! one after it could not be completed, and notes nothing (Müller, Gross, Novák 2017, section 5; Müller 2019, sections
-//! 10.2 and 10.7). How the pictures become one: [`super::combine`].
+//! all; then each has as many as all before it together. The last one takes all that is left of the budget, if that is
+//! less than twice as much, and notes nothing (after Müller, Gross, Novák 2017, section 5, and Müller 2019, sections
+//! 10.2 and 10.7, where iterations begin to double at one sample again, and the last one is as long as two: half of
+//! the picture then is guided by an eighth of the samples). How the pictures become one: [`super::combine`].
 
 use super::combine::{Iterations, Moments};
 use super::notebook::Notebook;
@@ -97,10 +98,10 @@ impl Lesson<'_, '_> {
         let mut pace = 0.0;
         for index in 0.. {
             let startup = index < self.training.startup;
-            let wanted = if startup { 1 } else { 1_u32 << (index - self.training.startup).min(30) };
+            let wanted = if startup { 1 } else { self.report.spp.max(1) };
             let left = self.samples_left(asked, pace);
-            // The one after it would not be completed: this one is the last, and as long as can be.
-            let last = !startup && wanted.saturating_mul(3) > left;
+            // What would be left for another one is less than it should have: this one is the last, and takes it.
+            let last = !startup && left < wanted.saturating_mul(2);
             let size = if last { asked - self.report.spp } else { wanted.min(asked - self.report.spp) };
             if size == 0 || (index > 0 && self.cx.control.should_stop()) {
                 break;
