@@ -5,6 +5,7 @@ use super::quadtree::{CELLS, EDGE, Quadtree, UNIFORM};
 use super::spatial::SpatialTree;
 use lucerna_core::interfaces::{Arena, GuideField, GuidedDirections, SurfaceHit};
 use lucerna_core::math::{Vec2, Vec3};
+use std::f32::consts::PI;
 use std::sync::{Arc, LazyLock};
 
 /// A field.
@@ -31,8 +32,9 @@ impl GuideField for Field {
         let leaf = &self.leaves[self.tree.leaf(self.tree.cell(hit.p)).0 as usize];
         let tree = leaf.directions.as_deref()?;
         let normal = hit.frame.n * 1f32.copysign(hit.wi.z);
-        let cosines = if self.cosine && one_sided { cosines(normal) } else { &[1.0; CELLS] };
-        Some(arena.alloc(Here::new(tree, leaf.p_guide, cosines)?))
+        // The integral of the factor over all directions.
+        let (cosines, reach) = if self.cosine && one_sided { (cosines(normal), PI) } else { (&[1.0; CELLS], 4.0 * PI) };
+        Some(arena.alloc(Here { reach, ..Here::new(tree, leaf.p_guide, cosines)? }))
     }
 
     fn incident(&self, p: Vec3, d: Vec3) -> Option<f32> {
@@ -70,6 +72,8 @@ struct Here<'g> {
     total: f32,
     /// What makes a density relative to a uniform one, per solid angle, of a weight.
     scale: f32,
+    /// What makes a density before it is weighted a multiple of the mean.
+    reach: f32,
 }
 
 impl<'g> Here<'g> {
@@ -82,7 +86,15 @@ impl<'g> Here<'g> {
         }
         let total = sum(&rows);
         let scale = UNIFORM * CELLS as f32 / total;
-        (total > 0.0 && scale.is_finite()).then_some(Here { tree, cosines, p_guide, rows, total, scale })
+        (total > 0.0 && scale.is_finite()).then_some(Here {
+            tree,
+            cosines,
+            p_guide,
+            rows,
+            total,
+            scale,
+            reach: 4.0 * PI,
+        })
     }
 }
 
@@ -115,6 +127,11 @@ impl GuidedDirections for Here<'_> {
     fn pdf(&self, d: Vec3) -> f32 {
         let (cell, density) = self.tree.pdf_in_cell(cylinder::of_direction(d));
         self.tree.grid[cell] * self.cosines[cell] * self.scale * density
+    }
+
+    fn light(&self, d: Vec3) -> f32 {
+        let (cell, density) = self.tree.pdf_in_cell(cylinder::of_direction(d));
+        self.tree.grid[cell] * self.scale * density * self.reach
     }
 }
 

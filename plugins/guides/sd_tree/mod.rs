@@ -17,7 +17,8 @@
 //! | `spatial_filter` | string | stochastic | records go to the cell they lie in (`nearest`), to one in a box about it (`stochastic`), or to all of the `box` by volume |
 //! | `directional_filter` | string | box | records go to the directions they lie in (`nearest`), or to all in a `box` about them by area |
 //! | `p_guide` | float | unset | probability of the guide, limited to 0.95; learnt if unset |
-//! | `product` | string | cosine | what the guide follows: `none`, the light alone; `cosine`, its product with the cosine, for BSDFs that reflect only |
+//! | `product` | string | cosine | what the guide follows: `none`, the light alone; `cosine`, its product with the cosine, for BSDFs that reflect only; `resampling`, its product with any BSDF, by a choice among candidates |
+//! | `candidates` | integer | 4 | for `resampling`: directions drawn at a vertex, of which one is followed |
 //! | `roughness_threshold` | float | 0.05 | narrower lobes than this are not guided |
 //! | `nee` | string | always | when lights are sampled: `never`, `kickstart` (the first 128 samples per pixel), `always` |
 //! | `direct` | boolean | true | light that emitter sampling also finds is learnt, times the weight of finding it by scattering |
@@ -69,7 +70,14 @@ pub const PLUGIN: Plugin = Plugin {
         Param::choice("spatial_filter", &["nearest", "stochastic", "box"], "stochastic", "cells a record goes to"),
         Param::choice("directional_filter", &["nearest", "box"], "box", "directions a record goes to"),
         Param::float_opt("p_guide", "probability of the guide; learnt if unset").range(0.0, 1.0),
-        Param::choice("product", &["none", "cosine"], "cosine", "what the guide follows besides the light"),
+        Param::choice(
+            "product",
+            &["none", "cosine", "resampling"],
+            "cosine",
+            "what the guide follows besides the light",
+        ),
+        Param::int("candidates", 4, "directions of which one is chosen, if the product is by resampling")
+            .range(1.0, 64.0),
         Param::float("roughness_threshold", 0.05, "narrower lobes are not guided").range(0.0, 1.0),
         Param::choice("nee", &["never", "kickstart", "always"], "always", "when lights are sampled"),
         Param::bool("direct", true, "learns light that emitter sampling also finds, by its weight"),
@@ -135,7 +143,7 @@ fn build(p: &Properties<'_>) -> Built<dyn Guide> {
             _ => DirectionalFilter::Box,
         },
         p_guide: p.float_opt("p_guide").map(|p| p.min(MOST_GUIDED)),
-        cosine: p.choice("product") == "cosine",
+        cosine: p.choice("product") != "none",
         max_bytes: (p.double("max_memory") * f64::from(1 << 20)) as usize,
     };
     let training = Training {
@@ -151,6 +159,7 @@ fn build(p: &Properties<'_>) -> Built<dyn Guide> {
         },
         learn_direct: p.bool("direct"),
         least_roughness: p.float("roughness_threshold"),
+        candidates: if p.choice("product") == "resampling" { number("candidates") } else { 1 },
     };
     Ok(Arc::new(SdTree { settings, training }))
 }

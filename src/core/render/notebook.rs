@@ -122,6 +122,7 @@ impl Notebook {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stats::figures::measured;
 
     fn vertex(weight: f32) -> Scattering {
         let kind = Some(RecordKind::Unguided);
@@ -156,6 +157,35 @@ mod tests {
             let found: Vec<f32> = book.into_records().iter().map(|r| r.radiance).collect();
             assert_eq!(found, expected, "{learn_direct}");
         }
+    }
+
+    /// A path of a thousand vertices: every one is noted, with all the light behind it, and nothing stays for the next.
+    #[test]
+    fn hc_p05_a_path_of_a_thousand_vertices_is_noted_to_its_end() {
+        const VERTICES: usize = 1000;
+        let mut book = Notebook::new(true);
+        for round in 1..=2 {
+            for _ in 0..VERTICES {
+                book.direct(Rgb::splat(1.0));
+                book.scattered(vertex(0.5));
+                book.survived(0.5);
+            }
+            book.met(Rgb::splat(3.0), true);
+            book.end();
+            assert_eq!((book.records.len(), book.links.len()), (round * VERTICES, 0));
+        }
+        // What is scattered is halved and doubled by roulette: from the last vertex 6 arrive, from each one before 2 more.
+        let records = book.into_records();
+        for path in records.chunks(VERTICES) {
+            for (behind, record) in path.iter().enumerate() {
+                let expected = 6.0 + 2.0 * behind as f32;
+                assert!((record.radiance / expected - 1.0).abs() < 1e-4, "{behind}: {}", record.radiance);
+            }
+        }
+        measured(
+            "hc_p05_a_path_of_a_thousand_vertices_is_noted_to_its_end",
+            format!("{VERTICES} records, the first of radiance {}", records[VERTICES - 1].radiance),
+        );
     }
 
     #[test]

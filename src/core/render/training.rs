@@ -38,6 +38,8 @@ pub struct Guidance<'a> {
     pub learning: bool,
     /// Narrower lobes than this are not guided.
     pub least_roughness: f32,
+    /// Directions that are tried at a vertex; while nothing has been learnt it makes no difference.
+    pub candidates: u32,
 }
 
 /// A forward estimator that is guided and notes what it finds.
@@ -168,9 +170,9 @@ impl Lesson<'_, '_> {
             EmitterSampling::Kickstart => start < KICKSTART,
             EmitterSampling::Always => true,
         };
-        let Training { learn_direct, least_roughness, .. } = self.training;
+        let Training { learn_direct, least_roughness, candidates, .. } = self.training;
         let (field, learner) = (self.learner.field(), &mut self.learner);
-        let guidance = Guidance { field: &*field, sample_emitters, learning, least_roughness };
+        let guidance = Guidance { field: &*field, sample_emitters, learning, least_roughness, candidates };
         let guided = Guided { estimator: self.estimator, guidance, learn_direct };
         // Notes are taken in as they come, so that those of a few tiles at most are held. A pass that is lost afterwards
         // has taught something nevertheless.
