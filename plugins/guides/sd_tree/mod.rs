@@ -18,7 +18,7 @@
 //! | `directional_filter` | string | box | records go to the directions they lie in (`nearest`), or to all in a `box` about them by area |
 //! | `p_guide` | float | unset | probability of the guide, limited to 0.95; learnt if unset |
 //! | `product` | string | cosine | what the guide follows: `none`, the light alone; `cosine`, its product with the cosine, for BSDFs that reflect only; `resampling`, its product with any BSDF, by a choice among candidates |
-//! | `candidates` | integer | 4 | for `resampling`: directions drawn at a vertex, of which one is followed |
+//! | `candidates` | integer | 2 | for `resampling`: directions drawn at a vertex, of which one is followed |
 //! | `roughness_threshold` | float | 0.05 | narrower lobes than this are not guided |
 //! | `nee` | string | always | when lights are sampled: `never`, `kickstart` (the first 128 samples per pixel), `always` |
 //! | `direct` | boolean | true | light that emitter sampling also finds is learnt, times the weight of finding it by scattering |
@@ -28,7 +28,10 @@
 //!
 //! Limits. A cell of space has one distribution for all its points: a bright spot near by is blurred by parallax until
 //! the cells are small, which takes millions of samples. Small or short renders, and those whose noise comes from
-//! sampled lights or from caustics that are rarely found, gain nothing, and each sample costs a third to twice as much.
+//! sampled lights or from caustics that are rarely found, gain little, and each sample costs a tenth (in large scenes) to
+//! twice as much (in a box of twelve triangles). Each candidate of `resampling` costs nearly as much again as the guide
+//! does; it pays where rays are dear and BSDFs are not diffuse. `prior` 0, `memory` 0, `spatial_threshold` 12000, both filters
+//! `nearest`, `p_guide` 0.5, `product` `none`, `startup` 0 and `combination` `last` are nearly the form of 2017.
 //!
 //! Roulette begins at the integrator's `rr_depth`. Where light arrives after many bounces it ends paths that matter, and
 //! a larger `rr_depth` may pay.
@@ -76,7 +79,7 @@ pub const PLUGIN: Plugin = Plugin {
             "cosine",
             "what the guide follows besides the light",
         ),
-        Param::int("candidates", 4, "directions of which one is chosen, if the product is by resampling")
+        Param::int("candidates", 2, "directions of which one is chosen, if the product is by resampling")
             .range(1.0, 64.0),
         Param::float("roughness_threshold", 0.05, "narrower lobes are not guided").range(0.0, 1.0),
         Param::choice("nee", &["never", "kickstart", "always"], "always", "when lights are sampled"),
