@@ -286,7 +286,7 @@ pub fn beckmann_across(u: f32) -> f32 {
 /// Kept off the ends, where slopes are infinite.
 #[inline]
 fn inside(u: f32) -> f32 {
-    u.min(1.0 - 1e-6).max(1e-6)
+    u.clamp(1e-6, 1.0 - 1e-6)
 }
 
 #[cfg(test)]

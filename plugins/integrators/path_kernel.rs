@@ -34,6 +34,19 @@ pub(super) trait Directions {
     /// Where the path goes on, in world space, and how.
     fn sample(here: Self::Here, hit: &SurfaceHit, bxdf: &dyn Bxdf, u1: f32, u2: Vec2) -> Option<Step>;
 
+    /// Candidates for that at a vertex, if there are several: one is [resampled](Self::resample).
+    fn candidates(&self) -> Option<u32>;
+
+    /// Where the path goes on, chosen among so many candidates by `choice`.
+    fn resample(
+        here: Self::Here,
+        hit: &SurfaceHit,
+        bxdf: &dyn Bxdf,
+        candidates: u32,
+        numbers: (f32, Vec2),
+        choice: f32,
+    ) -> Option<Step>;
+
     /// What the throughput, which is this, would be about if directions came from the BSDF; not less than it is.
     fn prospects(&self, throughput: Rgb) -> Rgb;
 
@@ -78,6 +91,8 @@ pub(super) trait Directions {
 pub(super) struct Step {
     /// It and its weight; the density is that of the mixture.
     pub sample: BxdfSample,
+    /// By what the weight is more than value over density, because this was chosen among several.
+    pub choice: f32,
     /// In world space.
     pub d: Vec3,
     /// Its density in the BSDF alone, or the probability of the delta lobe.
@@ -108,7 +123,24 @@ impl Directions for Unguided {
     #[inline(always)]
     fn sample((): (), hit: &SurfaceHit, bxdf: &dyn Bxdf, u1: f32, u2: Vec2) -> Option<Step> {
         let sample = bxdf.sample(hit.wi, u1, u2, Transport::Radiance)?;
-        Some(Step { d: hit.to_world(sample.wo), pdf_bsdf: sample.pdf, pdf_guide: 0.0, sample })
+        Some(Step { d: hit.to_world(sample.wo), pdf_bsdf: sample.pdf, pdf_guide: 0.0, choice: 1.0, sample })
+    }
+
+    #[inline(always)]
+    fn candidates(&self) -> Option<u32> {
+        None
+    }
+
+    #[inline(always)]
+    fn resample(
+        (): (),
+        hit: &SurfaceHit,
+        bxdf: &dyn Bxdf,
+        _candidates: u32,
+        (u1, u2): (f32, Vec2),
+        _choice: f32,
+    ) -> Option<Step> {
+        Self::sample((), hit, bxdf, u1, u2)
     }
 
     #[inline(always)]
@@ -175,6 +207,10 @@ pub(super) struct Guided<'a> {
     pub prospects: Rgb,
 }
 
+/// The two-dimensional Kronecker sequence of lowest discrepancy known: powers of one over the plastic number (Roberts
+/// 2018, "The unreasonable effectiveness of quasirandom sequences").
+const PLASTIC: Vec2 = Vec2::new(0.754_877_7, 0.569_840_3);
+
 /// The least that is left of a path's prospects at a vertex: whatever an albedo says, roulette gives it a chance.
 const LEAST_PROSPECTS: f32 = 0.05;
 
@@ -237,7 +273,8 @@ impl<'a> Directions for Guided<'a> {
             }
             // The index of refraction only serves roulette, which may be told anything.
             let lobe = bxdf.lobes().and(Lobes::SMOOTH);
-            return Some(Step { sample: BxdfSample { wo, weight, pdf, eta: 1.0, lobe }, d, pdf_bsdf, pdf_guide });
+            let sample = BxdfSample { wo, weight, pdf, eta: 1.0, lobe };
+            return Some(Step { sample, choice: 1.0, d, pdf_bsdf, pdf_guide });
         }
         let p_bsdf = 1.0 - p_guide;
         let rest = ((u1 - p_guide) / p_bsdf).min(ONE_MINUS_EPSILON);
@@ -251,6 +288,67 @@ impl<'a> Directions for Guided<'a> {
         let pdf = p_guide * step.pdf_guide + p_bsdf * step.pdf_bsdf;
         step.sample.weight *= step.pdf_bsdf / pdf;
         step.sample.pdf = pdf;
+        Some(step)
+    }
+
+    #[inline]
+    fn candidates(&self) -> Option<u32> {
+        Some(self.guidance.candidates).filter(|candidates| *candidates > 1)
+    }
+
+    /// Resampled importance sampling (Talbot, Cline, Egbert 2005) of the product of the BSDF and the light that was learnt.
+    ///
+    /// Each of M candidates i is drawn as [`sample`](Directions::sample) does, and has the contribution c(i), of which the
+    /// expectation is what is sought. Candidate j is chosen with probability w(j)/Σw(i) and counts c(j) Σw(i)/(M w(j)).
+    /// The expectation of that, given the candidates, is Σc(j)/M, if w(j) > 0 wherever c(j) ≠ 0; so it is what is sought,
+    /// whatever w is, and also if candidates depend on each other: they are spread evenly over the random numbers.
+    ///
+    /// Here w(i) is c(i) without the light, times what is expected of it: with the probability of the guide, the light that
+    /// was learnt over its mean, or else 1. For a diffuse BSDF that is what the mixture follows already, and the choice
+    /// changes nothing; it helps the more, the less the BSDF is like a cosine.
+    ///
+    /// The density of the direction that comes out has no closed form, but none is asked for. In c(j) light met by chance
+    /// is weighted against emitter sampling by the density of *one candidate*, the mixture's, and emitter sampling is
+    /// weighted against the same. The two weights sum to one for each direction, which is all that the proof of multiple
+    /// importance sampling needs (Veach 1997, section 9.2). It costs that emitter sampling counts for more than it would
+    /// if the better density were known.
+    #[inline]
+    fn resample(
+        here: Learnt<'a>,
+        hit: &SurfaceHit,
+        bxdf: &dyn Bxdf,
+        candidates: u32,
+        (u1, u2): (f32, Vec2),
+        choice: f32,
+    ) -> Option<Step> {
+        let Some((guide, p_guide)) = here.guide else { return Unguided::sample((), hit, bxdf, u1, u2) };
+        let (mut kept, mut kept_worth, mut total) = (None, 0.0, 0.0);
+        let mut rest = choice;
+        for i in 0..candidates {
+            let shift = i as f32;
+            let u1 = (u1 + shift / candidates as f32).fract().min(ONE_MINUS_EPSILON);
+            let u2 = (u2 + shift * PLASTIC).fract().min(Vec2::splat(ONE_MINUS_EPSILON));
+            let Some(step) = Self::sample(here, hit, bxdf, u1, u2) else { continue };
+            let light = p_guide * guide.light(step.d).max(0.0) + (1.0 - p_guide);
+            let worth = step.sample.weight.luminance() * light;
+            if !(worth > 0.0 && worth.is_finite()) {
+                // Nothing comes of it, or it is no number.
+                continue;
+            }
+            total += worth;
+            // A reservoir of one: with probability worth/total this one takes the place. What is left of the number is
+            // a random number again.
+            let p = worth / total;
+            if rest < p || kept.is_none() {
+                rest = (rest / p).min(ONE_MINUS_EPSILON);
+                (kept, kept_worth) = (Some(step), worth);
+            } else {
+                rest = ((rest - p) / (1.0 - p)).clamp(0.0, ONE_MINUS_EPSILON);
+            }
+        }
+        let mut step = kept?;
+        step.choice = total / (candidates as f32 * kept_worth);
+        step.sample.weight *= step.choice;
         Some(step)
     }
 
@@ -327,7 +425,9 @@ impl<'a> Directions for Guided<'a> {
             (true, false, None) => Some(RecordKind::Unguided),
         };
         let BxdfSample { weight, pdf, .. } = step.sample;
-        let Step { d, pdf_bsdf, pdf_guide, .. } = *step;
+        let Step { d, choice, pdf_bsdf, pdf_guide, .. } = *step;
+        // One over what the direction counts: a density in expectation, if there were several candidates.
+        let pdf = pdf / choice;
         self.notes.scattered(Scattering { p: hit.p, d, weight, pdf, pdf_bsdf, pdf_guide, kind });
     }
 
@@ -486,7 +586,10 @@ pub(super) fn trace<'v, D: Directions<Here: 'v>, R: Decides>(
                 found.rgb += throughput * direct;
             }
             let (u1, u2) = (stream.next_1d(), stream.next_2d());
-            let step = D::sample(here, &hit, bxdf, u1, u2);
+            let step = match directions.candidates() {
+                None => D::sample(here, &hit, bxdf, u1, u2),
+                Some(n) => D::resample(here, &hit, bxdf, n, (u1, u2), stream.next_1d()),
+            };
             // Drawn at every vertex, needed or not: the numbers of the next sample depend on it in the reference's order.
             let u_roulette = stream.next_1d();
             let Some(step) = step.filter(|step| scene.keeps_sides(&hit, step.sample.wo)) else {

@@ -25,6 +25,7 @@ pub const PLUGIN: Plugin = Plugin {
         Param::string("way", "none", "in which way; \"wrong\" has a density that is not that of its samples"),
         Param::float_opt("p_guide", "probability of the guide; as learnt if unset"),
         Param::string("outlook", "learnt", "what is told to roulette: learnt, zero, huge, nan, or random"),
+        Param::int("candidates", 1, "directions tried at a vertex"),
         Param::choice("nee", &["never", "kickstart", "always"], "always", "when lights are sampled"),
     ]],
     build: Constructor::Guide(build),
@@ -42,6 +43,8 @@ fn build(p: &Properties<'_>) -> Built<dyn Guide> {
         plugin: "sd_tree".to_owned(),
         id: None,
         parameters: vec![
+            value("product", lucerna::core::scene::Value::String("resampling".to_owned())),
+            value("candidates", lucerna::core::scene::Value::Integer(p.int("candidates"))),
             value("nee", lucerna::core::scene::Value::String(p.choice("nee").to_owned())),
             // Small, so that a few samples make many cells.
             value("spatial_threshold", lucerna::core::scene::Value::Float(200.0)),

@@ -20,12 +20,13 @@ fn render(guide: &str, threads: usize, budget: Budget, control: &Control<'_>) ->
 }
 
 /// Every way of learning, with small cells so that there are many.
-const GUIDES: [&str; 3] = [
+const GUIDES: [&str; 4] = [
     "<guide type='sd_tree'><float name='spatial_threshold' value='100'/></guide>",
     "<guide type='sd_tree'><float name='spatial_threshold' value='100'/><string name='spatial_filter' value='box'/>
      <string name='nee' value='kickstart'/></guide>",
     "<guide type='sd_tree'><float name='spatial_threshold' value='100'/><string name='spatial_filter' value='nearest'/>
      <string name='directional_filter' value='nearest'/><float name='p_guide' value='0.5'/></guide>",
+    "<guide type='sd_tree'><float name='spatial_threshold' value='100'/><string name='product' value='resampling'/></guide>",
 ];
 
 #[test]

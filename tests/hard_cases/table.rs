@@ -116,11 +116,13 @@ const CASES: &[Case] = &[
     ("p01", "what a guide has learnt, in 100 cells, and its mixture with BSDFs: samples as dense as told", "-"),
     ("p02", "records of nothing, of one, of zeros, of 1e30, of one direction: a sound field", "-"),
     ("p04", "positions at 1e18, all in one point: splits end, every point has a leaf", "-"),
+    ("p05", "a path of 1000 vertices: all are noted, with the light behind them", "-"),
     ("p06", "guided against not, trained and corrupted, probability 0 and 1: equal means", "-"),
     ("p07", "delta lobes: never guided; the selection probability keeps off both ends", "-"),
     ("p08", "learning with any number of threads: equal bits", "-"),
     ("p09", "iterations that are black or without variance: finite weights, no black picture", "-"),
     ("p11", "the limit of memory: refinement ends, and says so", "-"),
+    ("p12", "light from an open sky on diffuse things: variance times rays at most 1.25 times that of unguided", "-"),
     (
         "p14",
         "roulette told of throughputs and light from 0 to 1e30, or of wrong light: answers in [0.05, 20], equal means",

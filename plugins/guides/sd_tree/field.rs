@@ -6,6 +6,7 @@ use super::quadtree::{CELLS, EDGE, Quadtree, UNIFORM};
 use super::spatial::SpatialTree;
 use lucerna_core::interfaces::{Arena, GuideField, GuidedDirections, Outlook, SurfaceHit};
 use lucerna_core::math::{Vec2, Vec3};
+use std::f32::consts::PI;
 use std::sync::{Arc, LazyLock};
 
 /// A field.
@@ -34,8 +35,9 @@ impl GuideField for Field {
         let leaf = &self.leaves[self.tree.leaf(self.tree.cell(hit.p)).0 as usize];
         let tree = leaf.directions.as_deref()?;
         let normal = hit.frame.n * 1f32.copysign(hit.wi.z);
-        let cosines = (self.cosine && one_sided).then(|| cosines(normal));
-        Some(arena.alloc(Here::new(tree, leaf.p_guide, cosines)?))
+        // The integral of the factor over all directions.
+        let (cosines, reach) = if self.cosine && one_sided { (cosines(normal), PI) } else { (&[1.0; CELLS], 4.0 * PI) };
+        Some(arena.alloc(Here { reach, ..Here::new(tree, leaf.p_guide, cosines)? }))
     }
 
     fn incident(&self, p: Vec3, d: Vec3) -> Option<f32> {
@@ -64,36 +66,50 @@ impl GuideField for Field {
     }
 }
 
-/// A leaf's directions at a vertex.
+/// A leaf's directions at a vertex. Weights of cells are products that are made when they are needed: most vertices need
+/// few of them, but all need their sums.
 struct Here<'g> {
     tree: &'g Quadtree,
+    /// Factors of the grid's cells.
+    cosines: &'g [f32; CELLS],
     p_guide: f32,
-    /// Weights of the grid's cells.
-    weights: [f32; CELLS],
-    /// Sums of its rows.
+    /// Sums of the weights in the rows of the grid.
     rows: [f32; EDGE],
     /// The sum of all.
     total: f32,
     /// What makes a density relative to a uniform one, per solid angle, of a weight.
     scale: f32,
+    /// What makes a density before it is weighted a multiple of the mean.
+    reach: f32,
 }
 
 impl<'g> Here<'g> {
     /// `None` if no light comes from where it would be scattered.
     #[inline]
-    fn new(tree: &'g Quadtree, p_guide: f32, cosines: Option<&[f32; CELLS]>) -> Option<Self> {
-        let mut weights = tree.grid;
-        if let Some(cosines) = cosines {
-            weights.iter_mut().zip(cosines).for_each(|(weight, cosine)| *weight *= cosine);
-        }
+    fn new(tree: &'g Quadtree, p_guide: f32, cosines: &'g [f32; CELLS]) -> Option<Self> {
         let mut rows = [0.0; EDGE];
-        for (row, cells) in rows.iter_mut().zip(weights.as_chunks::<EDGE>().0) {
-            *row = sum(cells);
+        for (j, row) in rows.iter_mut().enumerate() {
+            *row = sum(&product(tree, cosines, j));
         }
         let total = sum(&rows);
         let scale = UNIFORM * CELLS as f32 / total;
-        (total > 0.0 && scale.is_finite()).then_some(Here { tree, p_guide, weights, rows, total, scale })
+        (total > 0.0 && scale.is_finite()).then_some(Here {
+            tree,
+            cosines,
+            p_guide,
+            rows,
+            total,
+            scale,
+            reach: 4.0 * PI,
+        })
     }
+}
+
+/// The weights of a row of the grid.
+#[inline]
+fn product(tree: &Quadtree, cosines: &[f32; CELLS], row: usize) -> [f32; EDGE] {
+    let (grid, cosines) = (&tree.grid.as_chunks::<EDGE>().0[row], &cosines.as_chunks::<EDGE>().0[row]);
+    std::array::from_fn(|i| grid[i] * cosines[i])
 }
 
 /// The sum of eight numbers, always in the same order.
@@ -109,15 +125,20 @@ impl GuidedDirections for Here<'_> {
 
     fn sample(&self, u2: Vec2) -> (Vec3, f32) {
         let (row, y) = pick(&self.rows, self.total, f64::from(u2.y));
-        let (column, x) = pick(&self.weights.as_chunks::<EDGE>().0[row], self.rows[row], f64::from(u2.x));
-        let cell = EDGE * row + column;
-        let (p, density) = self.tree.sample_in_cell(cell, [x, y]);
-        (cylinder::to_direction(p), self.weights[cell] * self.scale * density)
+        let weights = product(self.tree, self.cosines, row);
+        let (column, x) = pick(&weights, self.rows[row], f64::from(u2.x));
+        let (p, density) = self.tree.sample_in_cell(EDGE * row + column, [x, y]);
+        (cylinder::to_direction(p), weights[column] * self.scale * density)
     }
 
     fn pdf(&self, d: Vec3) -> f32 {
         let (cell, density) = self.tree.pdf_in_cell(cylinder::of_direction(d));
-        self.weights[cell] * self.scale * density
+        self.tree.grid[cell] * self.cosines[cell] * self.scale * density
+    }
+
+    fn light(&self, d: Vec3) -> f32 {
+        let (cell, density) = self.tree.pdf_in_cell(cylinder::of_direction(d));
+        self.tree.grid[cell] * self.scale * density * self.reach
     }
 }
 

@@ -87,7 +87,7 @@ impl Learner {
             let sums = Sums::unpack(&mut from)?;
             let (outlooks, known) = outlook::unpack(&mut from)?;
             leaves.push(Leaf { directions: directions.clone(), p_guide, fluence, outlooks: known });
-            cells.push(Cell { sums, count, mixing, directions, fluence, outlooks });
+            cells.push(Cell { sums, count, mixing, halved: 0, directions, fluence, outlooks });
         }
         from.end()?;
         let field = Arc::new(Field { tree: tree.clone(), leaves, cosine: settings.cosine });

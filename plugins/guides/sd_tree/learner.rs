@@ -4,8 +4,9 @@
 //!
 //! | what | published | here |
 //! |---|---|---|
-//! | records until a cell is halved, times √samples | 12000, with filters 4000 | 1000: pictures here have fewer pixels |
-//! | part of the flux until directions are divided, depth | 0.01, 20 | the same |
+//! | records until a cell is halved, times √samples | 12000, with filters 4000 | 500: pictures here have fewer pixels |
+//! | what a cell knows | its own records of the last iteration | those together with [what larger cells know](super::prior), and half of what was found before |
+//! | part of the flux until directions are divided, depth | 0.01, 20 | the same; but not where few records have nearly all of it |
 //! | upper levels of quadtrees | as the flux asks | always three, as a table that the cosine can weight |
 //! | filter of directions | cut off at the edges | goes round in the azimuth, is moved inside at the poles |
 //! | probability of the guide | any | from 0.05 to 0.95 if learnt, at most 0.95 if given |
@@ -14,12 +15,14 @@
 //! | light that emitter sampling finds | not learnt, or by its weight | by its weight |
 //! | weights of iterations | inverse mean variance of themselves | of the other half of the pixels |
 //! | roulette | none, or by the light ahead | by the albedo at guided vertices, or the throughput if it is larger |
-//! | iterations at the start, then | 8 of 1 sample, doubling | the same |
+//! | iterations at the start, then | 8 of 1 sample, then 1, 2, 4, … | 8 of 1 sample, then as many as all before: 8, 16, 32, … |
+//! | the last iteration | as long as two would be | from half to twice as long as all before: guided by a third of all samples or more, instead of by an eighth |
 
 use super::cylinder;
 use super::field::{Field, Leaf};
 use super::mixing::Mixing;
 use super::outlook::{SIDES, Totals, side};
+use super::prior;
 use super::quadtree::{Quadtree, Refinement, Sums};
 use super::spatial::SpatialTree;
 use super::{DirectionalFilter, Settings, SpatialFilter};
@@ -30,6 +33,9 @@ use std::sync::Arc;
 
 /// Above the limit of memory the threshold of quadtrees is doubled, so often at most.
 const MOST_COARSENINGS: u32 = 10;
+
+/// A cell of directions is divided if its flux is worth so many records for each one that the prior is.
+const LEAST_WORTH: f64 = 0.5;
 
 /// The tree that is filled.
 pub struct Learner {
@@ -51,6 +57,8 @@ pub(super) struct Cell {
     /// Records, each counted by the part of it that lies here.
     pub count: f64,
     pub mixing: Mixing,
+    /// How often it was halved since its sums were.
+    pub halved: u32,
     /// What was learnt before.
     pub directions: Option<Arc<Quadtree>>,
     pub fluence: f32,
@@ -159,19 +167,29 @@ impl Learner {
             let mut cells = cells.borrow_mut();
             cells[old as usize].count *= 0.5;
             cells[old as usize].outlooks.iter_mut().for_each(Totals::halve);
+            cells[old as usize].halved += 1;
             let half = cells[old as usize].clone();
             cells.push(half);
         });
         self.full |= full;
     }
 
-    /// Empties the sums; their trees follow the flux that was found.
-    fn empty(&mut self) {
-        let mut how = Refinement { threshold: self.settings.directional_threshold, depth: self.settings.depth };
+    /// Leaves a part of the sums; their trees follow the flux that was found.
+    fn fade(&mut self) {
+        let mut how = Refinement {
+            threshold: self.settings.directional_threshold,
+            depth: self.settings.depth,
+            worth: LEAST_WORTH * self.settings.prior,
+            kept: self.settings.memory,
+        };
         let old: Vec<Sums> = self.cells.iter_mut().map(|cell| std::mem::take(&mut cell.sums)).collect();
         for _ in 0..MOST_COARSENINGS {
-            self.cells.par_iter_mut().zip(&old).for_each(|(cell, old)| cell.sums = old.refined(how));
+            self.cells.par_iter_mut().zip(&old).for_each(|(cell, old)| {
+                let kept = how.kept * (-f64::from(cell.halved)).exp2();
+                cell.sums = old.refined(Refinement { kept, ..how });
+            });
             if self.bytes() <= self.settings.max_bytes {
+                self.cells.iter_mut().for_each(|cell| cell.halved = 0);
                 return;
             }
             self.full = true;
@@ -227,15 +245,18 @@ impl GuideLearner for Learner {
 
     fn refine(&mut self, spp: u32) {
         let p_guide = self.settings.p_guide;
-        self.cells.par_iter_mut().for_each(|cell| {
-            if let Some(tree) = Quadtree::new(&cell.sums) {
+        let total: f64 = self.cells.iter().map(|cell| cell.sums.total()).sum();
+        if total > 0.0 && total.is_finite() {
+            let prior = self.settings.prior;
+            let grids = prior::grids(&self.tree, |leaf| &self.cells[leaf].sums, prior);
+            self.cells.par_iter_mut().zip(grids).for_each(|(cell, grid)| {
                 cell.fluence = (cell.sums.total() / cell.count.max(1.0)) as f32;
-                cell.directions = Some(Arc::new(tree));
-            }
-        });
+                cell.directions = Some(Arc::new(Quadtree::new(grid, &cell.sums, prior)));
+            });
+        }
         self.split(spp);
-        self.empty();
-        self.cells.iter_mut().for_each(|cell| cell.count = 0.0);
+        self.fade();
+        self.cells.iter_mut().for_each(|cell| cell.count *= self.settings.memory);
         let leaf = |cell: &Cell| Leaf {
             directions: cell.directions.clone(),
             p_guide: p_guide.unwrap_or_else(|| cell.mixing.p_guide()),

@@ -9,24 +9,30 @@
 //!
 //! | parameter | type | default | meaning |
 //! |---|---|---|---|
-//! | `spatial_threshold` | float | 1000 | a cell of space is halved with more records than this times √(samples per pixel of the iteration) |
+//! | `spatial_threshold` | float | 500 | a cell of space is halved with more records than this times √(samples per pixel of the iteration) |
 //! | `directional_threshold` | float | 0.01 | a cell of directions is divided with more than this part of the flux |
 //! | `directional_depth` | integer | 20 | levels of quadtrees at most, from 3 to 20 |
+//! | `prior` | float | 8 | what larger cells of space have found counts as much as so many records, and so does, inside a cell of directions, light from everywhere; 0 as published |
+//! | `memory` | float | 0.5 | part of what was found that still counts an iteration later; 0 as published |
 //! | `spatial_filter` | string | stochastic | records go to the cell they lie in (`nearest`), to one in a box about it (`stochastic`), or to all of the `box` by volume |
 //! | `directional_filter` | string | box | records go to the directions they lie in (`nearest`), or to all in a `box` about them by area |
 //! | `p_guide` | float | unset | probability of the guide, limited to 0.95; learnt if unset |
-//! | `product` | string | cosine | what the guide follows: `none`, the light alone; `cosine`, its product with the cosine, for BSDFs that reflect only |
+//! | `product` | string | cosine | what the guide follows: `none`, the light alone; `cosine`, its product with the cosine, for BSDFs that reflect only; `resampling`, its product with any BSDF, by a choice among candidates |
+//! | `candidates` | integer | 2 | for `resampling`: directions drawn at a vertex, of which one is followed |
 //! | `roughness_threshold` | float | 0.05 | narrower lobes than this are not guided |
 //! | `nee` | string | always | when lights are sampled: `never`, `kickstart` (the first 128 samples per pixel), `always` |
 //! | `direct` | boolean | true | light that emitter sampling also finds is learnt, times the weight of finding it by scattering |
-//! | `startup` | integer | 8 | iterations of one sample per pixel before those that double |
+//! | `startup` | integer | 8 | iterations of one sample per pixel before those that have as many samples as all before them |
 //! | `ending` | string | doubling | when the last iteration begins: once the one after it could not be completed (`doubling`), or, from 256 samples per pixel on, as soon as the `variance` that the rest of the budget would leave rises from one iteration to the next |
 //! | `combination` | string | inverse_variance | which iterations make the picture: the last four by `inverse_variance`, or the `last` |
 //! | `max_memory` | float | 64 | MiB that the trees may take; then they stay coarser |
 //!
 //! Limits. A cell of space has one distribution for all its points: a bright spot near by is blurred by parallax until
 //! the cells are small, which takes millions of samples. Small or short renders, and those whose noise comes from
-//! sampled lights or from caustics that are rarely found, gain nothing, and each sample costs a third to twice as much.
+//! sampled lights or from caustics that are rarely found, gain little, and each sample costs a tenth (in large scenes) to
+//! twice as much (in a box of twelve triangles). Each candidate of `resampling` costs nearly as much again as the guide
+//! does; it pays where rays are dear and BSDFs are not diffuse. `prior` 0, `memory` 0, `spatial_threshold` 12000, both filters
+//! `nearest`, `p_guide` 0.5, `product` `none`, `startup` 0 and `combination` `last` are nearly the form of 2017.
 //!
 //! Roulette begins at the integrator's `rr_depth`. Where light arrives after many bounces it ends paths that matter:
 //! `<roulette type="adjoint"/>` beside the guide goes by what this tree has learnt, or a larger `rr_depth` may pay.
@@ -45,6 +51,7 @@ mod kept;
 mod learner;
 mod mixing;
 mod outlook;
+mod prior;
 mod quadtree;
 mod spatial;
 
@@ -61,14 +68,23 @@ pub const PLUGIN: Plugin = Plugin {
     aliases: &[],
     summary: "learns incident light in a tree over space and directions",
     params: &[&[
-        Param::float("spatial_threshold", 1000.0, "records after which a cell of space is halved").at_least(1.0),
+        Param::float("spatial_threshold", 500.0, "records after which a cell of space is halved").at_least(1.0),
         Param::float("directional_threshold", 0.01, "part of the flux above which a cell of directions is divided")
             .range(1e-6, 1.0),
         Param::int("directional_depth", 20, "levels of quadtrees at most").range(3.0, quadtree::MOST_LEVELS as f64),
+        Param::float("prior", 8.0, "records that count as much as what larger cells around have found").at_least(0.0),
+        Param::float("memory", 0.5, "part of what was found that still counts an iteration later").range(0.0, 1.0),
         Param::choice("spatial_filter", &["nearest", "stochastic", "box"], "stochastic", "cells a record goes to"),
         Param::choice("directional_filter", &["nearest", "box"], "box", "directions a record goes to"),
         Param::float_opt("p_guide", "probability of the guide; learnt if unset").range(0.0, 1.0),
-        Param::choice("product", &["none", "cosine"], "cosine", "what the guide follows besides the light"),
+        Param::choice(
+            "product",
+            &["none", "cosine", "resampling"],
+            "cosine",
+            "what the guide follows besides the light",
+        ),
+        Param::int("candidates", 2, "directions of which one is chosen, if the product is by resampling")
+            .range(1.0, 64.0),
         Param::float("roughness_threshold", 0.05, "narrower lobes are not guided").range(0.0, 1.0),
         Param::choice("nee", &["never", "kickstart", "always"], "always", "when lights are sampled"),
         Param::bool("direct", true, "learns light that emitter sampling also finds, by its weight"),
@@ -106,6 +122,10 @@ struct Settings {
     spatial_threshold: f64,
     directional_threshold: f64,
     depth: u32,
+    /// Records that what larger cells have found is worth.
+    prior: f64,
+    /// Part of what was found that still counts an iteration later.
+    memory: f64,
     spatial_filter: SpatialFilter,
     directional_filter: DirectionalFilter,
     p_guide: Option<f32>,
@@ -121,6 +141,8 @@ fn build(p: &Properties<'_>) -> Built<dyn Guide> {
         spatial_threshold: p.double("spatial_threshold"),
         directional_threshold: p.double("directional_threshold"),
         depth: number("directional_depth"),
+        prior: p.double("prior"),
+        memory: p.double("memory"),
         spatial_filter: match p.choice("spatial_filter") {
             "nearest" => SpatialFilter::Nearest,
             "box" => SpatialFilter::Box,
@@ -131,7 +153,7 @@ fn build(p: &Properties<'_>) -> Built<dyn Guide> {
             _ => DirectionalFilter::Box,
         },
         p_guide: p.float_opt("p_guide").map(|p| p.min(MOST_GUIDED)),
-        cosine: p.choice("product") == "cosine",
+        cosine: p.choice("product") != "none",
         max_bytes: (p.double("max_memory") * f64::from(1 << 20)) as usize,
         directions: true,
     };
@@ -152,6 +174,7 @@ fn build(p: &Properties<'_>) -> Built<dyn Guide> {
         },
         learn_direct: p.bool("direct"),
         least_roughness: p.float("roughness_threshold"),
+        candidates: if p.choice("product") == "resampling" { number("candidates") } else { 1 },
     };
     Ok(Arc::new(SdTree { settings, training }))
 }
@@ -174,6 +197,8 @@ pub(crate) fn outlook_alone() -> Arc<dyn Guide> {
         spatial_filter: SpatialFilter::Nearest,
         directional_filter: DirectionalFilter::Nearest,
         p_guide: Some(0.0),
+        prior: 0.0,
+        memory: 0.0,
         cosine: false,
         max_bytes: 64 << 20,
         directions: false,
@@ -185,6 +210,7 @@ pub(crate) fn outlook_alone() -> Arc<dyn Guide> {
         emitter_sampling: EmitterSampling::Always,
         learn_direct: true,
         least_roughness: 0.0,
+        candidates: 1,
     };
     Arc::new(SdTree { settings, training })
 }

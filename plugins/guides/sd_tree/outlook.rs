@@ -82,11 +82,11 @@ impl Totals {
 pub fn pack(totals: &[Totals; SIDES], known: &[Option<Outlook>; SIDES], to: &mut Packer) {
     let bits = |is_there: [bool; SIDES]| is_there.iter().rev().fold(0, |bits, b| 2 * bits + u16::from(*b));
     to.u16(bits(totals.map(|t| !t.is_empty())) | bits(known.map(|k| k.is_some())) << SIDES);
-    for Totals { count, light, square, cost } in totals.iter().filter(|t| !t.is_empty()) {
-        [count, light, square, cost].into_iter().for_each(|sum| to.f64(*sum));
+    for Totals { count, light, square, cost, spread, splits } in totals.iter().filter(|t| !t.is_empty()) {
+        [count, light, square, cost, spread, splits].into_iter().for_each(|sum| to.f64(*sum));
     }
-    for Outlook { light, square, cost } in known.iter().flatten() {
-        [light, square, cost].into_iter().for_each(|mean| to.f32(*mean));
+    for Outlook { light, square, cost, spread } in known.iter().flatten() {
+        [light, square, cost, spread].into_iter().for_each(|mean| to.f32(*mean));
     }
 }
 
@@ -99,14 +99,17 @@ pub fn unpack(from: &mut Cursor<'_>) -> Result<([Totals; SIDES], [Option<Outlook
     let bits = from.u16(WHAT)?;
     let (mut totals, mut known) = ([Totals::default(); SIDES], [None; SIDES]);
     for (_, total) in totals.iter_mut().enumerate().filter(|(side, _)| bits >> side & 1 == 1) {
-        let (count, light, square, cost) = (from.f64(WHAT)?, from.f64(WHAT)?, from.f64(WHAT)?, from.f64(WHAT)?);
-        if [count, light, square, cost].iter().any(|sum| !(0.0..=f64::MAX).contains(sum)) {
+        let mut next = || from.f64(WHAT);
+        let (count, light, square) = (next()?, next()?, next()?);
+        let (cost, spread, splits) = (next()?, next()?, next()?);
+        if [count, light, square, cost, spread, splits].iter().any(|sum| !(0.0..=f64::MAX).contains(sum)) {
             return Err(IoError::new("a cell has sums that are no sums of light"));
         }
-        *total = Totals { count, light, square, cost };
+        *total = Totals { count, light, square, cost, spread, splits };
     }
     for (_, known) in known.iter_mut().enumerate().filter(|(side, _)| bits >> (SIDES + side) & 1 == 1) {
-        *known = Some(Outlook { light: from.f32(WHAT)?, square: from.f32(WHAT)?, cost: from.f32(WHAT)? });
+        let mut next = || from.f32(WHAT);
+        *known = Some(Outlook { light: next()?, square: next()?, cost: next()?, spread: next()? });
     }
     Ok((totals, known))
 }

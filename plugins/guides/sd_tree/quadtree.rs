@@ -52,13 +52,46 @@ fn cell(p: &mut Vec2) -> usize {
     j * EDGE + i
 }
 
+/// What was found in a cell: its flux, and how far that can be relied on.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Found {
+    /// Sum of the records' radiance over density.
+    pub flux: f64,
+    /// Sum of the squares of that, each by the part of the record that lies here.
+    pub squares: f64,
+}
+
+impl Found {
+    fn add(&mut self, flux: f64, part: f64) {
+        self.flux += flux * part;
+        self.squares += flux * flux * part;
+    }
+
+    /// Both together.
+    pub fn and(self, other: Found) -> Found {
+        Found { flux: self.flux + other.flux, squares: self.squares + other.squares }
+    }
+
+    /// A part of it.
+    pub fn part(self, part: f64) -> Found {
+        Found { flux: part * self.flux, squares: part * self.squares }
+    }
+
+    /// The number of equal records that would be as reliable: 1 where one firefly is brighter than all the rest (Kish
+    /// 1965, *Survey Sampling*, section 11.7).
+    pub fn worth(self) -> f64 {
+        let worth = self.flux * (self.flux / self.squares);
+        if worth.is_finite() { worth } else { 0.0 }
+    }
+}
+
 /// A tree that is filled. Only leaves are added to.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sums {
-    grid: [f64; CELLS],
+    grid: [Found; CELLS],
     roots: [u16; CELLS],
     /// The first one is not used.
-    nodes: Vec<Node<f64>>,
+    nodes: Vec<Node<Found>>,
 }
 
 /// How a tree is refined.
@@ -68,11 +101,15 @@ pub struct Refinement {
     pub threshold: f64,
     /// Levels below the square at most.
     pub depth: u32,
+    /// A cell whose flux has a lower [worth](Found::worth) is not divided.
+    pub worth: f64,
+    /// Part of what was found that goes on to count.
+    pub kept: f64,
 }
 
 impl Default for Sums {
     fn default() -> Self {
-        Sums { grid: [0.0; CELLS], roots: [0; CELLS], nodes: vec![Node::default()] }
+        Sums { grid: [Found::default(); CELLS], roots: [0; CELLS], nodes: vec![Node::default()] }
     }
 }
 
@@ -83,7 +120,7 @@ impl Sums {
         let cell = cell(&mut p);
         let mut node = self.roots[cell];
         if node == 0 {
-            self.grid[cell] += value;
+            self.grid[cell].add(value, 1.0);
             return;
         }
         loop {
@@ -91,7 +128,7 @@ impl Sums {
             let Node { value: sums, child: children } = &mut self.nodes[usize::from(node)];
             node = children[child];
             if node == 0 {
-                sums[child] += value;
+                sums[child].add(value, 1.0);
                 return;
             }
         }
@@ -114,65 +151,71 @@ impl Sums {
         let size = (-f64::from(self.level(p))).exp2();
         let low_u = (f64::from(p.x) - 0.5 * size).clamp(0.0, 1.0 - size);
         let low_v = f64::from(p.y) - 0.5 * size;
-        let density = value / (size * size);
         for turn in [-1.0, 0.0, 1.0] {
             let (from, to) = ((low_v + turn).max(0.0), (low_v + turn + size).min(1.0));
             if from < to {
-                self.spread([low_u, from], [low_u + size, to], density);
+                self.spread(&Patch { from: [low_u, from], to: [low_u + size, to], value, part: 1.0 / (size * size) });
             }
         }
     }
 
-    /// Adds a density over a rectangle inside the square.
-    fn spread(&mut self, from: [f64; 2], to: [f64; 2], density: f64) {
+    /// Adds a record over a rectangle inside the square.
+    fn spread(&mut self, patch: &Patch) {
         const SIZE: f64 = 1.0 / EDGE as f64;
         let range = |axis: usize| {
-            let first = (from[axis] / SIZE) as usize;
-            first.min(EDGE - 1)..=((to[axis] / SIZE) as usize).min(EDGE - 1)
+            let first = (patch.from[axis] / SIZE) as usize;
+            first.min(EDGE - 1)..=((patch.to[axis] / SIZE) as usize).min(EDGE - 1)
         };
         for j in range(1) {
             for i in range(0) {
                 let low = [i as f64 * SIZE, j as f64 * SIZE];
-                let area = overlap(from, to, low, SIZE);
+                let part = patch.part_in(low, SIZE);
                 let cell = j * EDGE + i;
                 match self.roots[cell] {
-                    _ if area <= 0.0 => {}
-                    0 => self.grid[cell] += area * density,
-                    root => self.spread_below(root, low, 0.5 * SIZE, from, to, density),
+                    _ if part <= 0.0 => {}
+                    0 => self.grid[cell].add(patch.value, part),
+                    root => self.spread_below(root, low, 0.5 * SIZE, patch),
                 }
             }
         }
     }
 
-    fn spread_below(&mut self, node: u16, low: [f64; 2], half: f64, from: [f64; 2], to: [f64; 2], density: f64) {
+    fn spread_below(&mut self, node: u16, low: [f64; 2], half: f64, patch: &Patch) {
         for child in 0..4 {
             let at = [low[0] + half * (child & 1) as f64, low[1] + half * (child >> 1) as f64];
-            let area = overlap(from, to, at, half);
+            let part = patch.part_in(at, half);
             match self.nodes[usize::from(node)].child[child] {
-                _ if area <= 0.0 => {}
-                0 => self.nodes[usize::from(node)].value[child] += area * density,
-                below => self.spread_below(below, at, 0.5 * half, from, to, density),
+                _ if part <= 0.0 => {}
+                0 => self.nodes[usize::from(node)].value[child].add(patch.value, part),
+                below => self.spread_below(below, at, 0.5 * half, patch),
             }
         }
     }
 
-    /// Sum below a node.
-    fn total_below(&self, node: u16) -> f64 {
+    /// What was found below a node.
+    fn total_below(&self, node: u16) -> Found {
         let Node { value, child } = &self.nodes[usize::from(node)];
-        (0..4).map(|i| if child[i] == 0 { value[i] } else { self.total_below(child[i]) }).sum()
+        let below = |i: usize| if child[i] == 0 { value[i] } else { self.total_below(child[i]) };
+        below(0).and(below(1)).and(below(2)).and(below(3))
     }
 
-    /// Sum of a cell of the grid.
-    fn cell_total(&self, cell: usize) -> f64 {
+    /// What was found in a cell of the grid.
+    fn cell_total(&self, cell: usize) -> Found {
         if self.roots[cell] == 0 { self.grid[cell] } else { self.total_below(self.roots[cell]) }
     }
 
-    /// Sum of all.
-    pub fn total(&self) -> f64 {
-        (0..CELLS).map(|cell| self.cell_total(cell)).sum()
+    /// What was found in the cells of the grid.
+    pub fn cells(&self) -> [Found; CELLS] {
+        std::array::from_fn(|cell| self.cell_total(cell))
     }
 
-    /// An empty tree whose leaves have about the same flux each, if that is distributed as here.
+    /// Flux of all.
+    pub fn total(&self) -> f64 {
+        self.cells().iter().map(|found| found.flux).sum()
+    }
+
+    /// A tree whose leaves have about the same flux each, if that is distributed as here, with a part of what was found.
+    /// Cells in which few records have nearly all the flux stay whole: where exactly it lies is not known.
     pub fn refined(&self, how: Refinement) -> Sums {
         let total = self.total();
         let mut new = Sums::default();
@@ -180,13 +223,19 @@ impl Sums {
             return new;
         }
         // From the top downwards, so that a tree that is full is balanced: the place of a child, its node here if it has
-        // one, its flux and its level.
-        let mut open: VecDeque<(Option<u16>, usize, u16, f64, u32)> = VecDeque::new();
+        // one, what was found in it and its level.
+        let mut open: VecDeque<(Option<u16>, usize, u16, Found, u32)> = VecDeque::new();
         for cell in 0..CELLS {
-            open.push_back((None, cell, self.roots[cell], self.cell_total(cell) / total, GRID_LEVEL));
+            open.push_back((None, cell, self.roots[cell], self.cell_total(cell), GRID_LEVEL));
         }
-        while let Some((parent, place, old, flux, level)) = open.pop_front() {
-            if flux <= how.threshold || level >= how.depth || new.nodes.len() >= MOST_NODES {
+        while let Some((parent, place, old, found, level)) = open.pop_front() {
+            let divided = found.flux > how.threshold * total && found.worth() >= how.worth;
+            if !divided || level >= how.depth || new.nodes.len() >= MOST_NODES {
+                let kept = match parent {
+                    None => &mut new.grid[place],
+                    Some(parent) => &mut new.nodes[usize::from(parent)].value[place],
+                };
+                *kept = found.part(how.kept);
                 continue;
             }
             let index = new.nodes.len() as u16;
@@ -197,12 +246,12 @@ impl Sums {
             }
             for child in 0..4 {
                 let (below, part) = match old {
-                    0 => (0, 0.25 * flux),
+                    0 => (0, found.part(0.25)),
                     old => {
                         let Node { value, child: children } = &self.nodes[usize::from(old)];
                         match children[child] {
-                            0 => (0, value[child] / total),
-                            below => (below, self.total_below(below) / total),
+                            0 => (0, value[child]),
+                            below => (below, self.total_below(below)),
                         }
                     }
                 };
@@ -212,19 +261,14 @@ impl Sums {
         new
     }
 
-    /// Bytes it takes.
-    pub fn bytes(&self) -> usize {
-        size_of::<Self>() + self.nodes.len() * size_of::<Node<f64>>()
-    }
-
-    /// Writes it. Between iterations all sums are 0, and not written.
+    /// Writes it; sums that are all 0 are not written.
     pub fn pack(&self, to: &mut Packer) {
         pack_shape(&self.roots, &self.nodes, to);
         let sums = || self.grid.iter().chain(self.nodes[1..].iter().flat_map(|node| &node.value));
-        let filled = sums().any(|sum| *sum != 0.0);
+        let filled = sums().any(|found| *found != Found::default());
         to.u16(filled.into());
         if filled {
-            sums().for_each(|sum| to.f64(*sum));
+            sums().for_each(|Found { flux, squares }| [flux, squares].into_iter().for_each(|sum| to.f64(*sum)));
         }
     }
 
@@ -234,17 +278,38 @@ impl Sums {
     /// If it is no tree of sums.
     pub fn unpack(from: &mut Cursor<'_>) -> Result<Self> {
         let (roots, mut nodes) = unpack_shape(from)?;
-        let mut grid = [0.0; CELLS];
+        let mut grid = [Found::default(); CELLS];
         if from.u16("sums")? != 0 {
             for sum in grid.iter_mut().chain(nodes[1..].iter_mut().flat_map(|node| &mut node.value)) {
-                *sum = from.f64("sums")?;
+                *sum = Found { flux: from.f64("sums")?, squares: from.f64("sums")? };
                 // Infinite sums come from infinite radiance; they are left out when the tree is refined.
-                if sum.is_nan() || *sum < 0.0 {
+                if [sum.flux, sum.squares].iter().any(|sum| sum.is_nan() || *sum < 0.0) {
                     return Err(IoError::new("a sum of flux is negative or no number"));
                 }
             }
         }
         Ok(Sums { grid, roots, nodes })
+    }
+
+    /// Bytes it takes.
+    pub fn bytes(&self) -> usize {
+        size_of::<Self>() + self.nodes.len() * size_of::<Node<Found>>()
+    }
+}
+
+/// A record over a rectangle of the square.
+struct Patch {
+    from: [f64; 2],
+    to: [f64; 2],
+    value: f64,
+    /// Part of the record per area.
+    part: f64,
+}
+
+impl Patch {
+    /// The part of the record in a square.
+    fn part_in(&self, low: [f64; 2], size: f64) -> f64 {
+        self.part * overlap(self.from, self.to, low, size)
     }
 }
 
@@ -293,6 +358,11 @@ fn overlap(from: [f64; 2], to: [f64; 2], low: [f64; 2], size: f64) -> f64 {
     side(0) * side(1)
 }
 
+/// A part that was found by records of such a worth, if `prior` others would have had the part `expected`.
+pub fn blend(part: f64, worth: f64, expected: f64, prior: f64) -> f64 {
+    if worth > 0.0 { (worth * part + prior * expected) / (worth + prior) } else { expected }
+}
+
 /// A tree to sample from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Quadtree {
@@ -304,27 +374,21 @@ pub struct Quadtree {
 }
 
 impl Quadtree {
-    /// Of what was summed; `None` if nothing was.
-    pub fn new(sums: &Sums) -> Option<Self> {
-        let total = sums.total();
-        if !(total > 0.0 && total.is_finite()) {
-            return None;
-        }
-        let mut tree = Quadtree { grid: [0.0; CELLS], roots: sums.roots, nodes: Vec::with_capacity(sums.nodes.len()) };
-        for (cell, part) in tree.grid.iter_mut().enumerate() {
-            *part = (sums.cell_total(cell) / total) as f32;
-        }
+    /// With these parts of the flux in the cells of the grid, and inside them as was summed. Where that was found by few
+    /// records, what they say counts less than a uniform distribution.
+    pub fn new(grid: [f32; CELLS], sums: &Sums, prior: f64) -> Self {
+        let mut nodes = Vec::with_capacity(sums.nodes.len());
         for node in &sums.nodes {
             let parts = [0, 1, 2, 3].map(|i: usize| match node.child[i] {
                 0 => node.value[i],
                 below => sums.total_below(below),
             });
-            let total: f64 = parts.iter().sum();
-            // A node without flux is never reached.
-            let value = parts.map(|part| if total > 0.0 { (part / total) as f32 } else { 0.25 });
-            tree.nodes.push(Node { value, child: node.child });
+            let total = parts.iter().fold(Found::default(), |total, part| total.and(*part));
+            let worth = total.worth();
+            let value = parts.map(|part| blend(part.flux / total.flux, worth, 0.25, prior) as f32);
+            nodes.push(Node { value, child: node.child });
         }
-        Some(tree)
+        Quadtree { grid, roots: sums.roots, nodes }
     }
 
     /// The cell of a point, and its density relative to a uniform one inside this cell.
@@ -457,7 +521,13 @@ mod tests {
     use super::*;
     use lucerna_core::sampling::Pcg32;
 
-    const HOW: Refinement = Refinement { threshold: 0.01, depth: 20 };
+    const HOW: Refinement = Refinement { threshold: 0.01, depth: 20, worth: 0.0, kept: 0.0 };
+
+    /// As it was summed.
+    fn tree(sums: &Sums) -> Quadtree {
+        let total = sums.total();
+        Quadtree::new(sums.cells().map(|found| (found.flux / total) as f32), sums, 0.0)
+    }
 
     /// Sums of points that gather in two places, after two rounds of refinement.
     fn trained(box_filter: bool) -> Sums {
@@ -494,13 +564,13 @@ mod tests {
     fn the_box_goes_round() {
         let mut sums = Sums::default();
         sums.add_box(Vec2::new(0.99, 0.999), 1.0);
-        let (first, last) = (sums.cell_total(EDGE - 1), sums.cell_total(CELLS - 1));
+        let (first, last) = (sums.cell_total(EDGE - 1).flux, sums.cell_total(CELLS - 1).flux);
         assert!((first - 0.492).abs() < 1e-6 && (last - 0.508).abs() < 1e-6, "{first} {last}");
     }
 
     #[test]
     fn cells_with_much_flux_are_divided() {
-        let tree = Quadtree::new(&trained(false)).unwrap();
+        let tree = tree(&trained(false));
         tree.validate().unwrap();
         assert!(tree.nodes() > 20 && tree.nodes() < 600, "{}", tree.nodes());
         let (_, peak) = tree.pdf_in_cell(Vec2::new(0.3005, 0.9995));
@@ -509,30 +579,54 @@ mod tests {
 
     #[test]
     fn hc_p02_sums_of_nothing_one_and_extremes_are_usable() {
-        assert_eq!(Quadtree::new(&Sums::default()), None);
+        let uniform = Quadtree::new([1.0 / CELLS as f32; CELLS], &Sums::default(), 8.0);
+        assert_eq!(uniform.pdf_in_cell(Vec2::splat(0.3)).1, 1.0);
         assert_eq!(Sums::default().refined(HOW), Sums::default());
         for value in [1e30, 1e-30, 1.0] {
             let mut sums = Sums::default();
             for _ in 0..30 {
                 sums.add(Vec2::new(0.2, 0.7), value);
-                let tree = Quadtree::new(&sums).unwrap();
+                let tree = tree(&sums);
                 tree.validate().unwrap();
                 assert!(tree.pdf_in_cell(Vec2::new(0.2, 0.7)).1.is_finite());
                 let mut next = sums.refined(HOW);
                 next.add_box(Vec2::new(0.2, 0.7), value);
-                Quadtree::new(&next).unwrap().validate().unwrap();
+                self::tree(&next).validate().unwrap();
                 sums = sums.refined(HOW);
             }
         }
+    }
+
+    /// What is kept is where it was, in finer cells and in coarser ones.
+    #[test]
+    fn a_part_is_kept_when_the_tree_changes() {
+        let old = trained(true);
+        for how in [HOW, Refinement { threshold: 0.3, ..HOW }, Refinement { threshold: 0.001, ..HOW }] {
+            let new = old.refined(Refinement { kept: 0.5, ..how });
+            for (old, new) in old.cells().iter().zip(new.cells()) {
+                assert!((0.5 * old.flux - new.flux).abs() < 1e-6 * old.flux, "{old:?} {new:?}");
+            }
+        }
+    }
+
+    /// A thousand equal records divide a cell; one that outshines them does not, and says little.
+    #[test]
+    fn one_firefly_is_not_believed() {
+        let (place, how) = (Vec2::splat(0.3), Refinement { worth: 4.0, ..HOW });
         let mut sums = Sums::default();
-        sums.add(Vec2::ZERO, f64::INFINITY);
-        assert_eq!(Quadtree::new(&sums), None);
+        (0..1000).for_each(|_| sums.add(place, 1.0));
+        assert!((sums.cells()[18].worth() - 1000.0).abs() < 1e-6);
+        assert!(sums.refined(how).nodes.len() > 1);
+        sums.add(place, 1e9);
+        assert!((sums.cells()[18].worth() - 1.0).abs() < 1e-5);
+        assert_eq!(sums.refined(how), sums.refined(Refinement { depth: 3, ..how }));
+        assert!((blend(1.0, 1.0, 0.1, 8.0) - 0.2).abs() < 1e-12 && blend(f64::NAN, 0.0, 0.1, 0.0) == 0.1);
     }
 
     /// The density of samples is that of the same point, and the cell too.
     #[test]
     fn samples_have_their_density() {
-        let tree = Quadtree::new(&trained(true)).unwrap();
+        let tree = tree(&trained(true));
         let mut pcg = Pcg32::new(1, 1);
         for _ in 0..20_000 {
             let from = (pcg.next_below(CELLS as u32)) as usize;

@@ -14,6 +14,12 @@ const BITS: u32 = 20;
 /// Splits above a leaf at most.
 pub const DEEPEST: u32 = 3 * BITS;
 
+/// Bits of each coordinate by which a search begins: what is above that many levels is looked up.
+const TOP_BITS: u32 = 3;
+
+/// Splits that one look-up goes down.
+const TOP: u32 = 3 * TOP_BITS;
+
 /// The tree. Leaves are numbered from 0.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpatialTree {
@@ -23,6 +29,18 @@ pub struct SpatialTree {
     root: u32,
     nodes: Vec<[u32; 2]>,
     leaves: u32,
+    /// Where the search goes on for each cell of a grid of 8 × 8 × 8, and how many splits are above: nine, or as many as
+    /// the leaf has.
+    top: Vec<(u32, u32)>,
+}
+
+/// One half of a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Child {
+    /// Not divided: the number of the leaf.
+    Leaf(usize),
+    /// Divided: its place among the [inner](SpatialTree::inner) cells.
+    Inner(usize),
 }
 
 /// A position in the cube, in whole numbers of `BITS` bits.
@@ -34,7 +52,8 @@ impl SpatialTree {
         let extent = (bounds.max - bounds.min).max_element();
         let usable = bounds.is_finite() && !bounds.is_empty() && extent > 0.0 && (1.0 / extent).is_finite();
         let (min, scale) = if usable { (bounds.min, 1.0 / extent) } else { (Vec3::ZERO, 1.0) };
-        SpatialTree { min, scale, root: LEAF, nodes: Vec::new(), leaves: 1 }
+        let top = vec![(LEAF, 0); 1 << TOP];
+        SpatialTree { min, scale, root: LEAF, nodes: Vec::new(), leaves: 1, top }
     }
 
     /// Writes it; bounds are not part of it.
@@ -92,16 +111,37 @@ impl SpatialTree {
     /// The leaf at a position, and how many splits are above it.
     #[inline]
     pub fn leaf(&self, cell: Cell) -> (u32, u32) {
-        let mut node = self.root;
-        // Coordinates take turns; the bit that decides is the highest.
-        let [mut a, mut b, mut c] = cell.map(|x| x << (32 - BITS));
-        let mut depth = 0;
+        let [x, y, z] = cell.map(|x| (x >> (BITS - TOP_BITS)) as usize);
+        let (node, depth) = self.top[(((z << TOP_BITS) + y) << TOP_BITS) + x];
+        // Where the table ends in the tree, nine splits are above, three of each coordinate.
+        self.search(node, depth, cell.map(|x| x << (32 - BITS + TOP_BITS)))
+    }
+
+    /// The leaf at or below a node with so many splits above. The bits of coordinates that decide are the highest, and
+    /// the next decision is that of the first coordinate.
+    #[inline]
+    fn search(&self, mut node: u32, mut depth: u32, [mut a, mut b, mut c]: Cell) -> (u32, u32) {
         while node & LEAF == 0 {
             node = self.nodes[node as usize][(a >> 31) as usize];
             (a, b, c) = (b, c, a << 1);
             depth += 1;
         }
         (node & !LEAF, depth)
+    }
+
+    /// Fills the table by which searches begin.
+    fn look_up(&mut self) {
+        for index in 0..1 << TOP {
+            let coordinate = |axis: u32| (index >> (axis * TOP_BITS)) as u32 & ((1 << TOP_BITS) - 1);
+            let [mut a, mut b, mut c] = [0, 1, 2].map(|axis| coordinate(axis) << (32 - TOP_BITS));
+            let (mut node, mut depth) = (self.root, 0);
+            while node & LEAF == 0 && depth < TOP {
+                node = self.nodes[node as usize][(a >> 31) as usize];
+                (a, b, c) = (b, c, a << 1);
+                depth += 1;
+            }
+            self.top[index] = (node, depth);
+        }
     }
 
     /// Extent of a leaf below so many splits, in whole numbers.
@@ -159,6 +199,7 @@ impl SpatialTree {
             }
             open.extend([1, 0].map(|side| (Some((index, side)), self.nodes[index][side], depth + 1)));
         }
+        self.look_up();
     }
 
     /// All leaves that overlap a box of whole numbers, with the part of the box's volume in each. The box lies inside
@@ -191,9 +232,18 @@ impl SpatialTree {
         }
     }
 
+    /// All cells that are divided, by their halves. The first one is the root, and halves stand after what they are of.
+    pub fn inner(&self) -> Vec<[Child; 2]> {
+        let child = |node: u32| match node & LEAF {
+            0 => Child::Inner(node as usize),
+            _ => Child::Leaf((node & !LEAF) as usize),
+        };
+        self.nodes.iter().map(|children| children.map(child)).collect()
+    }
+
     /// Bytes it takes.
     pub fn bytes(&self) -> usize {
-        self.nodes.len() * size_of::<[u32; 2]>()
+        self.nodes.len() * size_of::<[u32; 2]>() + self.top.len() * size_of::<(u32, u32)>()
     }
 
     /// Checks that every leaf is there once and every node is reached.

@@ -54,6 +54,8 @@ pub struct Training {
     pub learn_direct: bool,
     /// Narrower lobes than this are not guided.
     pub least_roughness: f32,
+    /// Directions that are tried at a vertex before one of them is chosen by the product of the BSDF and the light learnt.
+    pub candidates: u32,
 }
 
 /// When the last iteration begins, which has all that is left of the budget.
@@ -179,6 +181,12 @@ pub trait GuidedDirections {
 
     /// Density of a world direction per solid angle: that of [`sample`](Self::sample).
     fn pdf(&self, d: Vec3) -> f32;
+
+    /// Light that arrives from a world direction, as a multiple of the mean over all that a diffuse surface would scatter,
+    /// roughly.
+    fn light(&self, d: Vec3) -> f32 {
+        4.0 * std::f32::consts::PI * self.pdf(d)
+    }
 }
 
 /// What a path has found out at one vertex.

@@ -185,6 +185,7 @@ impl Notebook {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stats::figures::measured;
 
     const DIRECTIONS: Subjects = Subjects { directions: true, outlook: false };
 
@@ -221,6 +222,35 @@ mod tests {
             let found: Vec<f32> = book.into_records().0.iter().map(|r| r.radiance).collect();
             assert_eq!(found, expected, "{learn_direct}");
         }
+    }
+
+    /// A path of a thousand vertices: every one is noted, with all the light behind it, and nothing stays for the next.
+    #[test]
+    fn hc_p05_a_path_of_a_thousand_vertices_is_noted_to_its_end() {
+        const VERTICES: usize = 1000;
+        let mut book = Notebook::new(true, DIRECTIONS);
+        for round in 1..=2 {
+            for _ in 0..VERTICES {
+                book.direct(Rgb::splat(1.0));
+                book.scattered(vertex(0.5));
+                book.survived(0.5);
+            }
+            book.met(Rgb::splat(3.0), true);
+            book.end(0);
+            assert_eq!((book.records.len(), book.links.len()), (round * VERTICES, 0));
+        }
+        // What is scattered is halved and doubled by roulette: from the last vertex 6 arrive, from each one before 2 more.
+        let (records, _) = book.into_records();
+        for path in records.chunks(VERTICES) {
+            for (behind, record) in path.iter().enumerate() {
+                let expected = 6.0 + 2.0 * behind as f32;
+                assert!((record.radiance / expected - 1.0).abs() < 1e-4, "{behind}: {}", record.radiance);
+            }
+        }
+        measured(
+            "hc_p05_a_path_of_a_thousand_vertices_is_noted_to_its_end",
+            format!("{VERTICES} records, the first of radiance {}", records[VERTICES - 1].radiance),
+        );
     }
 
     #[test]

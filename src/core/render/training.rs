@@ -3,10 +3,11 @@
 //! Rendering is cut into iterations. In each, paths are guided by what the iterations before have taught, and note what
 //! they find; what a field gives does not change meanwhile. So every picture is unbiased, and has the same bits for any
 //! number of threads. First come some iterations of one sample per pixel, by which the field learns where paths go at
-//! all; then each has twice the samples of the one before. The last one takes all that is left of the budget, once the
-//! one after it could not be completed (or learning more no longer pays: [`Ending`]), and notes nothing, unless what is
-//! learnt is kept (Müller, Gross, Novák 2017, section 5; Müller 2019, sections
-//! 10.2 and 10.7). How the pictures become one: [`super::combine`].
+//! all; then each has as many as all before it together. The last one takes all that is left of the budget, if that is
+//! less than twice as much (or learning more no longer pays: [`Ending`]), and notes nothing, unless what is learnt is kept
+//! (after Müller, Gross, Novák 2017, section 5, and Müller 2019, sections
+//! 10.2 and 10.7, where iterations begin to double at one sample again, and the last one is as long as two: half of
+//! the picture then is guided by an eighth of the samples). How the pictures become one: [`super::combine`].
 
 use super::checkpoint::Keeper;
 use super::combine::Moments;
@@ -50,6 +51,8 @@ pub struct Guidance<'a> {
     pub goal: Goal,
     /// Narrower lobes than this are not guided.
     pub least_roughness: f32,
+    /// Directions that are tried at a vertex; while nothing has been learnt it makes no difference.
+    pub candidates: u32,
 }
 
 /// A forward estimator that is guided and notes what it finds.
@@ -189,12 +192,12 @@ impl Lesson<'_, '_> {
         let file = self.cx.guide_file.as_ref();
         let (frozen, keeps) = (file.is_some_and(|file| file.frozen), file.is_some_and(|file| !file.frozen));
         let is_startup = index < startup;
-        let wanted = if is_startup { 1 } else { first.saturating_mul(1 << (index - startup).min(30)) };
+        let wanted = if is_startup { 1 } else { self.at.report.spp.max(first) };
         let enough = frozen || self.at.course.enough;
         let (begin, left) = (self.at.report.spp, self.asked - self.at.report.spp);
         let likely = self.samples_left(pace);
-        // The one after it would not be completed: this one is the last, and as long as can be.
-        let last = enough || (!is_startup && wanted.saturating_mul(3) > likely);
+        // What would be left for another one is less than it should have: this one is the last, and takes it.
+        let last = enough || (!is_startup && likely < wanted.saturating_mul(2));
         let size = if last { left } else { wanted.min(left) };
         // Nobody learns from the last one, unless what was learnt is kept.
         let learning = if last || size == left { keeps && wanted <= likely } else { true };
@@ -273,14 +276,15 @@ impl Lesson<'_, '_> {
             EmitterSampling::Kickstart => start < KICKSTART && self.at.course.first == 1,
             EmitterSampling::Always => true,
         };
-        let Training { learn_direct, least_roughness, .. } = self.training;
+        let Training { learn_direct, least_roughness, candidates, .. } = self.training;
         let subjects = self.subjects;
         if subjects.outlook && start > 0 {
             self.at.estimates.update(self.at.report.rays as f64 / self.at.report.samples as f64);
         }
         let (field, learner) = (self.at.learner.field(), &mut self.at.learner);
         let goal = Goal::default();
-        let guidance = Guidance { field: &*field, sample_emitters, learning, subjects, goal, least_roughness };
+        let guidance =
+            Guidance { field: &*field, sample_emitters, learning, subjects, goal, least_roughness, candidates };
         let guided = Guided { estimator: self.estimator, guidance, learn_direct, estimates: &self.at.estimates };
         // Notes are taken in as they come, so that those of a few tiles at most are held. A pass that is lost afterwards
         // has taught something nevertheless.
