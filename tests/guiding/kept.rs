@@ -229,7 +229,7 @@ fn hc_x02_an_interrupted_guided_run_has_the_same_bits() {
         assert!(found == bits && again.samples == report.samples, "{name}");
     }
     let pixels = expected.samples / u64::from(SPP);
-    for stop in [4 * pixels + pixels / 2, 13 * pixels + 5, 20 * pixels + pixels / 3, 62 * pixels + 7] {
+    for stop in [4 * pixels + pixels / 2, 13 * pixels + 5, 20 * pixels + pixels / 3, 58 * pixels + 7] {
         let name = format!("after {stop} samples");
         let taken = AtomicU64::new(0);
         let count = |progress: lucerna::core::render::Progress| {

@@ -189,13 +189,18 @@ impl Learner {
                 cell.sums = old.refined(Refinement { kept, ..how });
             });
             if self.bytes() <= self.settings.max_bytes {
-                self.cells.iter_mut().for_each(|cell| cell.halved = 0);
-                return;
+                break;
             }
             self.full = true;
             how.threshold *= 2.0;
         }
-        self.cells.iter_mut().for_each(|cell| cell.sums = Sums::default());
+        let fits = self.bytes() <= self.settings.max_bytes;
+        for cell in &mut self.cells {
+            cell.halved = 0;
+            if !fits {
+                cell.sums = Sums::default();
+            }
+        }
     }
 }
 
@@ -250,7 +255,7 @@ impl GuideLearner for Learner {
             let prior = self.settings.prior;
             let grids = prior::grids(&self.tree, |leaf| &self.cells[leaf].sums, prior);
             self.cells.par_iter_mut().zip(grids).for_each(|(cell, grid)| {
-                cell.fluence = (cell.sums.total() / cell.count.max(1.0)) as f32;
+                cell.fluence = (cell.sums.total() / cell.count.max(1.0)).min(f64::from(f32::MAX)) as f32;
                 cell.directions = Some(Arc::new(Quadtree::new(grid, &cell.sums, prior)));
             });
         }

@@ -96,6 +96,7 @@ impl SpatialTree {
         }
         tree.root = if count == 0 { LEAF } else { 0 };
         tree.leaves = count as u32 + 1;
+        tree.look_up();
         Ok(tree)
     }
 
