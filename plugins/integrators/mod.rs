@@ -5,6 +5,8 @@ mod common;
 mod decides;
 mod depth;
 mod direct;
+mod directions;
+mod guided;
 mod lights;
 mod moment;
 mod path;

@@ -54,6 +54,7 @@ mod outlook;
 mod prior;
 mod quadtree;
 mod spatial;
+mod sums;
 
 use learner::Learner;
 use lucerna_core::interfaces::{Combination, EmitterSampling, Ending, Guide, GuideLearner, MOST_GUIDED, Training};

@@ -6,8 +6,9 @@
 //! is half of, and so on up to the root, which expects light from everywhere (the mean of a Dirichlet distribution given
 //! its records, applied from the root to the leaves).
 
-use super::quadtree::{CELLS, Found, Sums, blend};
+use super::quadtree::{CELLS, blend};
 use super::spatial::{Child, SpatialTree};
+use super::sums::{Found, Sums};
 
 /// What was found in a cell of space, in each cell of the grid.
 type Grid = [Found; CELLS];
