@@ -21,12 +21,14 @@ const SEEDS: u32 = 10;
 /// Samples per pixel of each; of `path` four times as many.
 const SPP: u32 = 64;
 
-/// All combinations of a guide or none and a light sampler, but for `path` itself.
+/// All combinations of a guide or none, a roulette and a light sampler, but for `path` itself.
 fn methods() -> Vec<Method> {
     let mut names = Vec::new();
     for guide in ["", "+guide=sd_tree"] {
-        for lights in ["", "+light_sampler=power", "+light_sampler=light_tree", "+light_sampler=ris"] {
-            names.push(format!("{PATH}{guide}{lights}"));
+        for roulette in ["", "+roulette=adjoint"] {
+            for lights in ["", "+light_sampler=power", "+light_sampler=light_tree", "+light_sampler=ris"] {
+                names.push(format!("{PATH}{guide}{roulette}{lights}"));
+            }
         }
     }
     Methods::parse(&names[1..]).expect("methods").list
