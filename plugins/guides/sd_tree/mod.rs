@@ -27,6 +27,9 @@
 //! | `combination` | string | inverse_variance | which iterations make the picture: the last four by `inverse_variance`, or the `last` |
 //! | `max_memory` | float | 64 | MiB that the trees may take; then they stay coarser |
 //!
+//! Where light is found rarely but from few directions, as that of a small lamp through glass, `prior` hides what was found:
+//! 0 is better there by far.
+//!
 //! Limits. A cell of space has one distribution for all its points: a bright spot near by is blurred by parallax until
 //! the cells are small, which takes millions of samples. Small or short renders, and those whose noise comes from
 //! sampled lights or from caustics that are rarely found, gain little, and each sample costs a tenth (in large scenes) to
