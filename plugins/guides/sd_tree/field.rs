@@ -36,7 +36,8 @@ impl GuideField for Field {
         let tree = leaf.directions.as_deref()?;
         let normal = hit.frame.n * 1f32.copysign(hit.wi.z);
         // The integral of the factor over all directions.
-        let (cosines, reach) = if self.cosine && one_sided { (cosines(normal), PI) } else { (&[1.0; CELLS], 4.0 * PI) };
+        let (cosines, reach) =
+            if self.cosine && one_sided { (cosines(normal), PI * f32::from(UPRIGHT)) } else { (&[1; CELLS], 4.0 * PI) };
         Some(arena.alloc(Here { reach, ..Here::new(tree, leaf.p_guide, cosines)? }))
     }
 
@@ -44,7 +45,7 @@ impl GuideField for Field {
         let leaf = &self.leaves[self.tree.leaf(self.tree.cell(p)).0 as usize];
         let tree = leaf.directions.as_deref()?;
         let (cell, density) = tree.pdf_in_cell(cylinder::of_direction(d));
-        Some(leaf.fluence * UNIFORM * tree.grid[cell] * CELLS as f32 * density)
+        Some(leaf.fluence * UNIFORM * tree.grid[cell].get() * CELLS as f32 * density)
     }
 
     fn outlook(&self, p: Vec3, n: Vec3) -> Option<Outlook> {
@@ -71,10 +72,10 @@ impl GuideField for Field {
 struct Here<'g> {
     tree: &'g Quadtree,
     /// Factors of the grid's cells.
-    cosines: &'g [f32; CELLS],
+    cosines: &'g [u8; CELLS],
     p_guide: f32,
-    /// Sums of the weights in the rows of the grid.
-    rows: [f32; EDGE],
+    /// Sums of the weights in the columns of the grid.
+    columns: [f32; EDGE],
     /// The sum of all.
     total: f32,
     /// What makes a density relative to a uniform one, per solid angle, of a weight.
@@ -86,18 +87,21 @@ struct Here<'g> {
 impl<'g> Here<'g> {
     /// `None` if no light comes from where it would be scattered.
     #[inline]
-    fn new(tree: &'g Quadtree, p_guide: f32, cosines: &'g [f32; CELLS]) -> Option<Self> {
-        let mut rows = [0.0; EDGE];
-        for (j, row) in rows.iter_mut().enumerate() {
-            *row = sum(&product(tree, cosines, j));
-        }
-        let total = sum(&rows);
+    fn new(tree: &'g Quadtree, p_guide: f32, cosines: &'g [u8; CELLS]) -> Option<Self> {
+        let mut columns = [0.0; EDGE];
+        let rows = tree.grid.as_chunks::<EDGE>().0.iter().zip(cosines.as_chunks::<EDGE>().0);
+        rows.for_each(|(grid, cosines)| {
+            for i in 0..EDGE {
+                columns[i] += grid[i].get() * f32::from(cosines[i]);
+            }
+        });
+        let total = sum(&columns);
         let scale = UNIFORM * CELLS as f32 / total;
         (total > 0.0 && scale.is_finite()).then_some(Here {
             tree,
             cosines,
             p_guide,
-            rows,
+            columns,
             total,
             scale,
             reach: 4.0 * PI,
@@ -105,11 +109,10 @@ impl<'g> Here<'g> {
     }
 }
 
-/// The weights of a row of the grid.
+/// The weights of a column of the grid.
 #[inline]
-fn product(tree: &Quadtree, cosines: &[f32; CELLS], row: usize) -> [f32; EDGE] {
-    let (grid, cosines) = (&tree.grid.as_chunks::<EDGE>().0[row], &cosines.as_chunks::<EDGE>().0[row]);
-    std::array::from_fn(|i| grid[i] * cosines[i])
+fn product(tree: &Quadtree, cosines: &[u8; CELLS], column: usize) -> [f32; EDGE] {
+    std::array::from_fn(|j| tree.grid[EDGE * j + column].get() * f32::from(cosines[EDGE * j + column]))
 }
 
 /// The sum of eight numbers, always in the same order.
@@ -124,21 +127,21 @@ impl GuidedDirections for Here<'_> {
     }
 
     fn sample(&self, u2: Vec2) -> (Vec3, f32) {
-        let (row, y) = pick(&self.rows, self.total, f64::from(u2.y));
-        let weights = product(self.tree, self.cosines, row);
-        let (column, x) = pick(&weights, self.rows[row], f64::from(u2.x));
+        let (column, x) = pick(&self.columns, self.total, f64::from(u2.x));
+        let weights = product(self.tree, self.cosines, column);
+        let (row, y) = pick(&weights, self.columns[column], f64::from(u2.y));
         let (p, density) = self.tree.sample_in_cell(EDGE * row + column, [x, y]);
-        (cylinder::to_direction(p), weights[column] * self.scale * density)
+        (cylinder::to_direction(p), weights[row] * self.scale * density)
     }
 
     fn pdf(&self, d: Vec3) -> f32 {
         let (cell, density) = self.tree.pdf_in_cell(cylinder::of_direction(d));
-        self.tree.grid[cell] * self.cosines[cell] * self.scale * density
+        self.tree.grid[cell].get() * f32::from(self.cosines[cell]) * self.scale * density
     }
 
     fn light(&self, d: Vec3) -> f32 {
         let (cell, density) = self.tree.pdf_in_cell(cylinder::of_direction(d));
-        self.tree.grid[cell] * self.scale * density * self.reach
+        self.tree.grid[cell].get() * self.scale * density * self.reach
     }
 }
 
@@ -160,38 +163,94 @@ fn pick(weights: &[f32; EDGE], total: f32, u: f64) -> (usize, f64) {
     (last, 1.0 - f64::EPSILON)
 }
 
-/// Normals are taken together in so many groups along each edge of the cylinder's square.
+/// Normals are taken together in so many groups along each edge of the octahedron's square.
 const GROUPS: usize = 16;
+
+/// What [`cosines`] calls 1.
+const UPRIGHT: u8 = u8::MAX;
 
 /// Mean cosine of each cell of the grid with a normal, for directions above the surface. It is averaged over the group of
 /// the normal too, so that no cell that could be seen has none.
-fn cosines(n: Vec3) -> &'static [f32; CELLS] {
-    static TABLE: LazyLock<Vec<[f32; CELLS]>> = LazyLock::new(|| {
+fn cosines(n: Vec3) -> &'static [u8; CELLS] {
+    static TABLE: LazyLock<Vec<[u8; CELLS]>> = LazyLock::new(|| {
         /// Points along an edge of a cell.
         const POINTS: usize = 4;
-        let points = |cells: usize| {
+        let points = |cells: usize, direction: fn(Vec2) -> Vec3| {
             let step = 1.0 / (cells * POINTS) as f32;
             move |cell: usize| {
                 let (i, j) = (cell % cells, cell / cells);
                 (0..POINTS * POINTS).map(move |k| {
                     let (x, y) = (i * POINTS + k % POINTS, j * POINTS + k / POINTS);
-                    cylinder::to_direction(Vec2::new((x as f32 + 0.5) * step, (y as f32 + 0.5) * step))
+                    direction(Vec2::new((x as f32 + 0.5) * step, (y as f32 + 0.5) * step))
                 })
             }
         };
-        let (normals, directions) = (points(GROUPS), points(EDGE));
+        let (normals, directions) = (points(GROUPS, of_octahedron), points(EDGE, cylinder::to_direction));
         let cells: Vec<Vec<Vec3>> = (0..CELLS).map(|cell| directions(cell).collect()).collect();
         let group = |group: usize| {
             let normals: Vec<Vec3> = normals(group).collect();
-            let mut row = [0.0; CELLS];
+            let mut row = [0; CELLS];
             for (mean, directions) in row.iter_mut().zip(&cells) {
                 let pairs = normals.iter().flat_map(|n| directions.iter().map(move |d| n.dot(*d).max(0.0)));
-                *mean = pairs.sum::<f32>() / (normals.len() * directions.len()) as f32;
+                let cosine = pairs.sum::<f32>() / (normals.len() * directions.len()) as f32;
+                *mean = (cosine * f32::from(UPRIGHT)).ceil() as u8;
             }
             row
         };
         (0..GROUPS * GROUPS).map(group).collect()
     });
-    let p = cylinder::of_direction(n) * GROUPS as f32;
+    let p = to_octahedron(n) * GROUPS as f32;
     &TABLE[(p.y as usize).min(GROUPS - 1) * GROUPS + (p.x as usize).min(GROUPS - 1)]
+}
+
+/// A unit vector's place in a square: the faces of an octahedron, with the lower four unfolded around the upper ones
+/// (Meyer, Süßmuth, Sußner, Stamminger, Greiner 2010, "On floating-point normal vectors").
+#[inline]
+fn to_octahedron(n: Vec3) -> Vec2 {
+    let a = n.abs();
+    let p = n.truncate() / (a.x + a.y + a.z);
+    let p = if n.z < 0.0 { folded(p) } else { p };
+    0.5 * p + 0.5
+}
+
+/// A place of the lower faces, if it is one of the upper ones; and back.
+#[inline]
+fn folded(p: Vec2) -> Vec2 {
+    (Vec2::ONE - Vec2::new(p.y, p.x).abs()).copysign(p)
+}
+
+/// The unit vector of a place.
+fn of_octahedron(p: Vec2) -> Vec3 {
+    let p = 2.0 * p - 1.0;
+    let z = 1.0 - p.x.abs() - p.y.abs();
+    let p = if z < 0.0 { folded(p) } else { p };
+    p.extend(z).normalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_octahedron_is_gone_round_and_back() {
+        for i in 0..32 {
+            for j in 0..32 {
+                let p = (Vec2::new(i as f32, j as f32) + 0.5) / 32.0;
+                let n = of_octahedron(p);
+                assert!((n.length() - 1.0).abs() < 1e-6 && (to_octahedron(n) - p).abs().max_element() < 1e-5, "{p}");
+            }
+        }
+        assert_eq!(to_octahedron(Vec3::Z), Vec2::splat(0.5));
+    }
+
+    /// A cell around a normal counts nearly fully, and one below the surface nothing.
+    #[test]
+    fn cosines_are_those_with_the_normal() {
+        for d in [Vec3::X, Vec3::NEG_Y, Vec3::new(0.6, 0.0, 0.8), Vec3::new(-0.36, 0.48, -0.8)] {
+            let cell_of = |d: Vec3| super::super::quadtree::cell(&mut cylinder::of_direction(d));
+            let row = cosines(d);
+            let cosine = f32::from(row[cell_of(d)]) / f32::from(UPRIGHT);
+            assert!(cosine > 0.8 && row[cell_of(-d)] == 0, "{d}: {cosine}");
+        }
+    }
 }

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `u64`, `u32`, `u16` | records taken in, iterations, whether the limit of memory was reached |
 //! | | the tree over space: number of nodes, two children each |
-//! | `u32` | trees over directions, then each: shape (number of nodes, roots, four children each), parts of the flux |
+//! | `u32` | trees over directions, then each: parts of the flux in the grid, which of its cells are divided, number of nodes, four `u16` each |
 //! | | cells of space, one more than nodes: which tree over directions (0: none), probability of the guide, fluence, records, the descent that learns the probability, shape of the sums, and the sums unless all are 0, what scattering brings |
 //!
 //! Cells that share a tree over directions still do afterwards.
@@ -25,8 +25,8 @@ use lucerna_core::math::Aabb;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// Bytes of a tree over directions at least: number of nodes, roots, parts.
-const LEAST_TREE: u64 = 4 + 64 * (2 + 4);
+/// Bytes of a tree over directions at least: the grid, which cells are divided, number of nodes.
+const LEAST_TREE: u64 = 64 * 2 + 8 + 4;
 
 impl Learner {
     /// All that is known.

@@ -3,6 +3,10 @@
 //!
 //! The upper three levels are a grid of 8 × 8 that every tree has: it is sampled like a table, and may be weighted by the
 //! cosine at a vertex. Each of its cells is a leaf or the root of a quadtree.
+//!
+//! Vertices ask for cells anywhere in space, so most questions wait for memory: numbers are as short as they may be. Parts
+//! of the flux have the 16 upper bits of a float in the grid, and 16 bits below it; a node takes 8 bytes. What is rounded is
+//! what is sampled and what is told as the density alike.
 
 use super::sums::{Found, Sums};
 use lucerna_core::io::limits::Cursor;
@@ -21,21 +25,14 @@ pub(super) const GRID_LEVEL: u32 = 3;
 /// Levels below the square at most.
 pub const MOST_LEVELS: u32 = 20;
 
-/// Nodes of a tree at most, for they are numbered with 16 bits and 0 means none.
-pub(super) const MOST_NODES: usize = u16::MAX as usize;
+/// Nodes of a tree at most, for they are numbered with 12 bits.
+pub(super) const MOST_NODES: usize = (1 << 12) - 1;
 
 /// Density per solid angle of a uniform direction.
 pub const UNIFORM: f32 = 0.25 / PI;
 
-/// A node of either tree: values of four children, and their nodes (0: a leaf). Child `2 j + i` is right for odd `i`
-/// (u above one half), upper for odd `j`.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Node<T> {
-    pub(super) value: [T; 4],
-    pub(super) child: [u16; 4],
-}
-
-/// The child in which a point lies, which becomes a point of that child.
+/// The child in which a point lies, which becomes a point of that child. Child `2 j + i` is right for odd `i` (u above one
+/// half), upper for odd `j`.
 #[inline]
 pub(super) fn descend(p: &mut Vec2) -> usize {
     *p *= 2.0;
@@ -53,89 +50,133 @@ pub(super) fn cell(p: &mut Vec2) -> usize {
     j * EDGE + i
 }
 
-/// Writes the shape of a tree: its roots and the children of its nodes.
-pub(super) fn pack_shape<T>(roots: &[u16; CELLS], nodes: &[Node<T>], to: &mut Packer) {
-    to.u32(nodes.len() as u32 - 1);
-    roots.iter().chain(nodes[1..].iter().flat_map(|node| &node.child)).for_each(|child| to.u16(*child));
-}
-
-/// Reads the shape of a tree, in which every node stands behind the one above it and is below it once.
-///
-/// # Errors
-/// If it is none.
-pub(super) fn unpack_shape<T: Copy + Default>(from: &mut Cursor<'_>) -> Result<([u16; CELLS], Vec<Node<T>>)> {
-    let count = from.count(8, "nodes of directions")?;
-    let mut levels = vec![0; count + 1];
-    let mut nodes = vec![Node::<T>::default(); count + 1];
-    let mut below = |above: usize, level: u32, levels: &mut [u32]| {
-        let child = from.u16("a node of directions")?;
-        let place = usize::from(child);
-        match levels.get_mut(place) {
-            _ if child == 0 => {}
-            Some(free) if *free == 0 && place > above && level < MOST_LEVELS => *free = level,
-            _ => return Err(IoError::new("a tree over directions is too deep or does not have every node once")),
-        }
-        Ok(child)
-    };
-    let mut roots = [0; CELLS];
-    for root in &mut roots {
-        *root = below(0, GRID_LEVEL, &mut levels)?;
-    }
-    for index in 1..=count {
-        if levels[index] == 0 || count >= MOST_NODES {
-            return Err(IoError::new("a tree over directions has too many nodes"));
-        }
-        for child in 0..4 {
-            nodes[index].child[child] = below(index, levels[index] + 1, &mut levels)?;
-        }
-    }
-    Ok((roots, nodes))
-}
-
 /// A part that was found by records of such a worth, if `prior` others would have had the part `expected`.
 pub fn blend(part: f64, worth: f64, expected: f64, prior: f64) -> f64 {
     if worth > 0.0 { (worth * part + prior * expected) / (worth + prior) } else { expected }
 }
 
+/// The upper half of a float: three decimal digits.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Short(u16);
+
+impl Short {
+    /// The nearest one.
+    fn of(value: f32) -> Self {
+        let bits = value.to_bits();
+        Short(((bits + 0x7fff + (bits >> 16 & 1)) >> 16) as u16)
+    }
+
+    /// As a float.
+    #[inline(always)]
+    pub fn get(self) -> f32 {
+        f32::from_bits(u32::from(self.0) << 16)
+    }
+}
+
+/// A cell that is divided into four.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Node {
+    /// The part of the flux in the lower two children, over all; in 65535ths.
+    lower: u16,
+    /// The part in the left child of the lower two, and of the upper two.
+    left: [u16; 2],
+    /// A bit for each child that is divided, and above them the number of the first one's node; those of the others follow.
+    below: u16,
+}
+
+/// What [`Node`] calls 1.
+const WHOLE: u16 = u16::MAX;
+
+impl Node {
+    /// The part of the flux in a child, times 4.
+    #[inline]
+    fn density(self, child: usize) -> f32 {
+        const SCALE: f32 = 4.0 / (WHOLE as f32 * WHOLE as f32);
+        let part = |of: u16, other: bool| f32::from(if other { WHOLE - of } else { of });
+        let (i, j) = (child & 1, child >> 1);
+        part(self.lower, j == 1) * part(self.left[j], i == 1) * SCALE
+    }
+
+    /// The node of a child; `None` of a leaf.
+    #[inline]
+    fn child(self, child: usize) -> Option<usize> {
+        /// Bits that are set in each number of four bits.
+        const SET: u64 = 0x4332_3221_3221_2110;
+        let mask = usize::from(self.below & 0xf);
+        let before = mask & ((1 << child) - 1);
+        (mask >> child & 1 == 1).then(|| usize::from(self.below >> 4) + (SET >> (4 * before) & 0xf) as usize)
+    }
+
+    /// How many children are divided.
+    fn divided(self) -> usize {
+        (self.below & 0xf).count_ones() as usize
+    }
+}
+
+/// A part of a whole in [`WHOLE`]ths. What is not nothing or all does not become it; what is no part is one half.
+fn share(part: f64, whole: f64) -> u16 {
+    let share = part / whole;
+    match share {
+        _ if !(0.0..=1.0).contains(&share) => WHOLE / 2,
+        0.0 => 0,
+        1.0 => WHOLE,
+        _ => ((share * f64::from(WHOLE)).round() as u16).clamp(1, WHOLE - 1),
+    }
+}
+
 /// A tree to sample from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Quadtree {
-    /// Part of the flux in each cell; they sum to 1.
-    pub grid: [f32; CELLS],
-    roots: [u16; CELLS],
-    /// Part of the flux in each child. The first one is not used.
-    nodes: Vec<Node<f32>>,
+    /// Part of the flux in each cell; they sum to 1, but for rounding.
+    pub grid: [Short; CELLS],
+    /// A bit for each cell that is divided. Their nodes come first, in this order.
+    divided: u64,
+    nodes: Vec<Node>,
 }
 
 impl Quadtree {
     /// With these parts of the flux in the cells of the grid, and inside them as was summed. Where that was found by few
-    /// records, what they say counts less than a uniform distribution.
+    /// records, what they say counts less than a uniform distribution, which is worth `prior` records.
     pub fn new(grid: [f32; CELLS], sums: &Sums, prior: f64) -> Self {
-        let mut nodes = Vec::with_capacity(sums.nodes.len());
-        for node in &sums.nodes {
-            let parts = [0, 1, 2, 3].map(|i: usize| match node.child[i] {
-                0 => node.value[i],
-                below => sums.total_below(below),
-            });
+        let roots = || sums.roots.iter().enumerate().filter(|(_, root)| **root != 0);
+        let divided = roots().fold(0, |bits, (cell, _)| bits | 1 << cell);
+        // Nodes of the sums in the order of the nodes here: all of a level, then those below.
+        let mut open: Vec<u16> = roots().map(|(_, root)| *root).collect();
+        let mut nodes = Vec::new();
+        while let Some(node) = open.get(nodes.len()).copied() {
+            let (parts, below) = sums.parts(node);
             let total = parts.iter().fold(Found::default(), |total, part| total.and(*part));
             let worth = total.worth();
-            let value = parts.map(|part| blend(part.flux / total.flux, worth, 0.25, prior) as f32);
-            nodes.push(Node { value, child: node.child });
+            let [a, b, c, d] = parts.map(|part| blend(part.flux / total.flux, worth, 0.25, prior));
+            let mut bits = (open.len() as u16) << 4;
+            for (child, node) in below.iter().enumerate().filter(|(_, node)| **node != 0) {
+                bits |= 1 << child;
+                open.push(*node);
+            }
+            let (lower, left) = (share(a + b, a + b + c + d), [share(a, a + b), share(c, c + d)]);
+            nodes.push(Node { lower, left, below: if bits & 0xf == 0 { 0 } else { bits } });
         }
-        Quadtree { grid, roots: sums.roots, nodes }
+        Quadtree { grid: grid.map(Short::of), divided, nodes }
+    }
+
+    /// The node of a cell of the grid.
+    #[inline]
+    fn root(&self, cell: usize) -> Option<usize> {
+        let before = self.divided & ((1 << cell) - 1);
+        (self.divided >> cell & 1 == 1).then(|| before.count_ones() as usize)
     }
 
     /// The cell of a point, and its density relative to a uniform one inside this cell.
     #[inline]
     pub fn pdf_in_cell(&self, mut p: Vec2) -> (usize, f32) {
         let cell = cell(&mut p);
-        let mut node = self.roots[cell];
+        let mut below = self.root(cell);
         let mut density = 1.0;
-        while node != 0 {
+        while let Some(node) = below {
             let child = descend(&mut p);
-            let Node { value, child: children } = &self.nodes[usize::from(node)];
-            density *= 4.0 * value[child];
-            node = children[child];
+            let node = self.nodes[node];
+            density *= node.density(child);
+            below = node.child(child);
         }
         (cell, density)
     }
@@ -147,19 +188,17 @@ impl Quadtree {
         let [mut x, mut y] = u;
         let mut low = [(cell % EDGE) as f64, (cell / EDGE) as f64].map(|i| i / EDGE as f64);
         let mut size = 1.0 / EDGE as f64;
-        let mut node = self.roots[cell];
+        let mut below = self.root(cell);
         let mut density = 1.0;
-        while node != 0 {
-            let Node { value, child: children } = &self.nodes[usize::from(node)];
+        while let Some(node) = below {
+            let node = self.nodes[node];
             size *= 0.5;
-            let lower = value[0] + value[1];
-            let (j, rest) = choose(y, lower / (lower + value[2] + value[3]));
-            let (a, b) = (value[2 * j], value[2 * j + 1]);
-            let (i, rest_x) = choose(x, a / (a + b));
+            let (j, rest) = choose(y, node.lower);
+            let (i, rest_x) = choose(x, node.left[j]);
             (x, y) = (rest_x, rest);
             low = [low[0] + size * i as f64, low[1] + size * j as f64];
-            density *= 4.0 * value[2 * j + i];
-            node = children[2 * j + i];
+            density *= node.density(2 * j + i);
+            below = node.child(2 * j + i);
         }
         let p = Vec2::new((low[0] + size * x) as f32, (low[1] + size * y) as f32);
         (p.min(Vec2::splat(ONE_MINUS_EPSILON)), density)
@@ -167,9 +206,12 @@ impl Quadtree {
 
     /// Writes it.
     pub fn pack(&self, to: &mut Packer) {
-        pack_shape(&self.roots, &self.nodes, to);
-        let parts = self.grid.iter().chain(self.nodes[1..].iter().flat_map(|node| &node.value));
-        parts.for_each(|part| to.f32(*part));
+        self.grid.iter().for_each(|part| to.u16(part.0));
+        to.u64(self.divided);
+        to.u32(self.nodes.len() as u32);
+        for Node { lower, left: [a, b], below } in &self.nodes {
+            [lower, a, b, below].into_iter().for_each(|bits| to.u16(*bits));
+        }
     }
 
     /// Reads what was written.
@@ -177,40 +219,48 @@ impl Quadtree {
     /// # Errors
     /// If it is no tree of probabilities.
     pub fn unpack(from: &mut Cursor<'_>) -> Result<Self> {
-        let (roots, nodes) = unpack_shape(from)?;
-        let mut tree = Quadtree { grid: [0.0; CELLS], roots, nodes };
-        for part in tree.grid.iter_mut().chain(tree.nodes[1..].iter_mut().flat_map(|node| &mut node.value)) {
-            *part = from.f32("probabilities")?;
+        const WHAT: &str = "a tree over directions";
+        let mut grid = [Short::default(); CELLS];
+        for part in &mut grid {
+            *part = Short(from.u16(WHAT)?);
         }
+        let divided = from.u64(WHAT)?;
+        let mut nodes = vec![Node::default(); from.count(size_of::<Node>() as u64, "nodes of directions")?];
+        for node in &mut nodes {
+            let (lower, left) = (from.u16(WHAT)?, [from.u16(WHAT)?, from.u16(WHAT)?]);
+            *node = Node { lower, left, below: from.u16(WHAT)? };
+        }
+        let tree = Quadtree { grid, divided, nodes };
         tree.validate().map_err(IoError::new)?;
         Ok(tree)
     }
 
+    /// The level of the cell that each node divides.
+    fn levels(&self) -> Vec<u32> {
+        let mut levels = vec![GRID_LEVEL; self.divided.count_ones() as usize];
+        for (index, node) in self.nodes.iter().enumerate() {
+            let level = levels.get(index).map_or(GRID_LEVEL, |level| level + 1);
+            levels.extend(std::iter::repeat_n(level, node.divided()));
+        }
+        levels
+    }
+
     /// Leaves at each level below the square, which is level 0.
     pub fn leaves_per_level(&self, counts: &mut [u64; MOST_LEVELS as usize + 1]) {
-        let mut levels = vec![GRID_LEVEL; self.nodes.len()];
-        let roots = self.roots.iter().filter(|root| **root == 0).count();
-        counts[GRID_LEVEL as usize] += roots as u64;
-        // A node comes after the one above it.
-        for (index, node) in self.nodes.iter().enumerate().skip(1) {
-            let level = levels[index] + 1;
-            for child in node.child {
-                match child {
-                    0 => counts[level as usize] += 1,
-                    below => levels[usize::from(below)] = level,
-                }
-            }
+        counts[GRID_LEVEL as usize] += u64::from(self.divided.count_zeros());
+        for (node, level) in self.nodes.iter().zip(self.levels()) {
+            counts[level as usize + 1] += 4 - node.divided() as u64;
         }
     }
 
     /// Nodes below the grid.
     pub fn nodes(&self) -> usize {
-        self.nodes.len() - 1
+        self.nodes.len()
     }
 
     /// Bytes it takes.
     pub fn bytes(&self) -> usize {
-        size_of::<Self>() + self.nodes.len() * size_of::<Node<f32>>()
+        size_of::<Self>() + self.nodes.len() * size_of::<Node>()
     }
 
     /// Checks that all parts are probabilities and sum to one, and that every node is reached once.
@@ -218,36 +268,34 @@ impl Quadtree {
     /// # Errors
     /// What does not hold.
     pub fn validate(&self) -> std::result::Result<(), String> {
-        let is_distribution = |parts: &[f32]| {
-            let sum: f32 = parts.iter().sum();
-            parts.iter().all(|p| *p >= 0.0) && (sum - 1.0).abs() < 1e-4
-        };
-        if !is_distribution(&self.grid) {
+        let parts = || self.grid.iter().map(|part| part.get());
+        if !(parts().all(|part| part >= 0.0) && (parts().sum::<f32>() - 1.0).abs() < 0.01) {
             return Err("the grid of a quadtree does not sum to 1".to_owned());
         }
-        let mut reached = vec![0; self.nodes.len()];
-        let children = self.nodes.iter().skip(1).flat_map(|node| node.child);
-        for child in self.roots.iter().copied().chain(children).filter(|child| *child != 0) {
-            match reached.get_mut(usize::from(child)) {
-                Some(times) => *times += 1,
-                None => return Err(format!("a quadtree refers to node {child}, which it does not have")),
+        let mut reached = self.divided.count_ones() as usize;
+        for (index, node) in self.nodes.iter().enumerate() {
+            let first = usize::from(node.below >> 4);
+            if index >= reached || (node.divided() > 0 && first != reached) || reached > MOST_NODES {
+                return Err("a node of a quadtree is not reached exactly once".to_owned());
             }
+            reached += node.divided();
         }
-        if reached.iter().skip(1).any(|times| *times != 1) {
-            return Err("a node of a quadtree is not reached exactly once".to_owned());
+        if reached != self.nodes.len() {
+            return Err("a quadtree refers to nodes that it does not have".to_owned());
         }
-        match self.nodes.iter().skip(1).all(|node| is_distribution(&node.value)) {
+        match self.levels().iter().all(|level| *level < MOST_LEVELS) {
             true => Ok(()),
-            false => Err("the children of a quadtree's node do not sum to 1".to_owned()),
+            false => Err("a quadtree is too deep".to_owned()),
         }
     }
 }
 
-/// 0 with this probability or else 1, and what is left of the number.
+/// 0 with this probability, in [`WHOLE`]ths, or else 1; and what is left of the number.
 #[inline]
-fn choose(u: f64, p: f32) -> (usize, f64) {
-    let p = f64::from(p);
-    if u < p { (0, u / p) } else { (1, ((u - p) / (1.0 - p)).min(1.0 - f64::EPSILON)) }
+fn choose(u: f64, p: u16) -> (usize, f64) {
+    let u = u * f64::from(WHOLE);
+    let (p, q) = (f64::from(p), f64::from(WHOLE - p));
+    if u < p { (0, u / p) } else { (1, ((u - p) / q).min(1.0 - f64::EPSILON)) }
 }
 
 #[cfg(test)]

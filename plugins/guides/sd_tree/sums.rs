@@ -1,6 +1,6 @@
 //! What was found in each direction, in a quadtree of the same form as that of [`super::quadtree`].
 
-use super::quadtree::{CELLS, EDGE, GRID_LEVEL, MOST_NODES, Node, cell, descend, pack_shape, unpack_shape};
+use super::quadtree::{CELLS, EDGE, GRID_LEVEL, MOST_LEVELS, MOST_NODES, cell, descend};
 use lucerna_core::io::limits::Cursor;
 use lucerna_core::io::sealed::Packer;
 use lucerna_core::io::{IoError, Result};
@@ -40,13 +40,20 @@ impl Found {
     }
 }
 
+/// What was found in four children, and their nodes (0: a leaf), numbered as in [`descend`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Node {
+    value: [Found; 4],
+    child: [u16; 4],
+}
+
 /// A tree that is filled. Only leaves are added to.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sums {
     grid: [Found; CELLS],
     pub(super) roots: [u16; CELLS],
     /// The first one is not used.
-    pub(super) nodes: Vec<Node<Found>>,
+    pub(super) nodes: Vec<Node>,
 }
 
 /// How a tree is refined.
@@ -149,14 +156,20 @@ impl Sums {
 
     /// What was found below a node.
     pub(super) fn total_below(&self, node: u16) -> Found {
-        let Node { value, child } = &self.nodes[usize::from(node)];
-        let below = |i: usize| if child[i] == 0 { value[i] } else { self.total_below(child[i]) };
-        below(0).and(below(1)).and(below(2)).and(below(3))
+        let ([a, b, c, d], _) = self.parts(node);
+        a.and(b).and(c).and(d)
     }
 
     /// What was found in a cell of the grid.
     pub(super) fn cell_total(&self, cell: usize) -> Found {
         if self.roots[cell] == 0 { self.grid[cell] } else { self.total_below(self.roots[cell]) }
+    }
+
+    /// What was found in the parts of a node, and their nodes.
+    pub(super) fn parts(&self, node: u16) -> ([Found; 4], [u16; 4]) {
+        let Node { value, child } = self.nodes[usize::from(node)];
+        let found = |i: usize| if child[i] == 0 { value[i] } else { self.total_below(child[i]) };
+        ([0, 1, 2, 3].map(found), child)
     }
 
     /// What was found in the cells of the grid.
@@ -248,8 +261,47 @@ impl Sums {
 
     /// Bytes it takes.
     pub fn bytes(&self) -> usize {
-        size_of::<Self>() + self.nodes.len() * size_of::<Node<Found>>()
+        size_of::<Self>() + self.nodes.len() * size_of::<Node>()
     }
+}
+
+/// Writes the shape of a tree: its roots and the children of its nodes.
+fn pack_shape(roots: &[u16; CELLS], nodes: &[Node], to: &mut Packer) {
+    to.u32(nodes.len() as u32 - 1);
+    roots.iter().chain(nodes[1..].iter().flat_map(|node| &node.child)).for_each(|child| to.u16(*child));
+}
+
+/// Reads the shape of a tree, in which every node stands behind the one above it and is below it once.
+///
+/// # Errors
+/// If it is none.
+fn unpack_shape(from: &mut Cursor<'_>) -> Result<([u16; CELLS], Vec<Node>)> {
+    let count = from.count(8, "nodes of directions")?;
+    let mut levels = vec![0; count + 1];
+    let mut nodes = vec![Node::default(); count + 1];
+    let mut below = |above: usize, level: u32, levels: &mut [u32]| {
+        let child = from.u16("a node of directions")?;
+        let place = usize::from(child);
+        match levels.get_mut(place) {
+            _ if child == 0 => {}
+            Some(free) if *free == 0 && place > above && level < MOST_LEVELS => *free = level,
+            _ => return Err(IoError::new("a tree over directions is too deep or does not have every node once")),
+        }
+        Ok(child)
+    };
+    let mut roots = [0; CELLS];
+    for root in &mut roots {
+        *root = below(0, GRID_LEVEL, &mut levels)?;
+    }
+    for index in 1..=count {
+        if levels[index] == 0 || count >= MOST_NODES {
+            return Err(IoError::new("a tree over directions has too many nodes"));
+        }
+        for child in 0..4 {
+            nodes[index].child[child] = below(index, levels[index] + 1, &mut levels)?;
+        }
+    }
+    Ok((roots, nodes))
 }
 
 /// A record over a rectangle of the square.
