@@ -8,6 +8,7 @@ use lucerna_core::interfaces::{
 };
 use lucerna_core::math::{ONE_MINUS_EPSILON, Vec2, Vec3};
 use lucerna_core::render::{Guidance, Notebook, Place, Scattering};
+use lucerna_core::sampling::{Reservoir, r2};
 
 /// Directions come from the mixture of a guide and the BSDF.
 pub(super) struct Guided<'a> {
@@ -20,10 +21,6 @@ pub(super) struct Guided<'a> {
     /// What the throughput would be about if directions had been chosen by the BSDF.
     pub prospects: Rgb,
 }
-
-/// The two-dimensional Kronecker sequence of lowest discrepancy known: powers of one over the plastic number (Roberts
-/// 2018, "The unreasonable effectiveness of quasirandom sequences").
-const PLASTIC: Vec2 = Vec2::new(0.754_877_7, 0.569_840_3);
 
 /// The least that is left of a path's prospects at a vertex: whatever an albedo says, roulette gives it a chance.
 const LEAST_PROSPECTS: f32 = 0.05;
@@ -136,33 +133,17 @@ impl<'a> Directions for Guided<'a> {
         choice: f32,
     ) -> Option<Step> {
         let Some((guide, p_guide)) = here.guide else { return Unguided::sample((), hit, bxdf, u1, u2) };
-        let (mut kept, mut kept_worth, mut total) = (None, 0.0, 0.0);
-        let mut rest = choice;
+        let mut tried = Reservoir::new(choice);
         for i in 0..candidates {
-            let shift = i as f32;
-            let u1 = (u1 + shift / candidates as f32).fract().min(ONE_MINUS_EPSILON);
-            let u2 = (u2 + shift * PLASTIC).fract().min(Vec2::splat(ONE_MINUS_EPSILON));
-            let Some(step) = Self::sample(here, hit, bxdf, u1, u2) else { continue };
+            let u1 = (u1 + i as f32 / candidates as f32).fract().min(ONE_MINUS_EPSILON);
+            let Some(step) = Self::sample(here, hit, bxdf, u1, r2(u2, i)) else { continue };
             let light = p_guide * guide.light(step.d).max(0.0) + (1.0 - p_guide);
             let worth = step.sample.weight.luminance() * light;
-            if !(worth > 0.0 && worth.is_finite()) {
-                // Nothing comes of it, or it is no number.
-                continue;
-            }
-            total += worth;
-            // A reservoir of one: with probability worth/total this one takes the place. What is left of the number is
-            // a random number again.
-            let p = worth / total;
-            if rest < p || kept.is_none() {
-                rest = (rest / p).min(ONE_MINUS_EPSILON);
-                (kept, kept_worth) = (Some(step), worth);
-            } else {
-                rest = ((rest - p) / (1.0 - p)).clamp(0.0, ONE_MINUS_EPSILON);
-            }
+            tried.offer(step, worth);
         }
-        let mut step = kept?;
-        step.choice = total / (candidates as f32 * kept_worth);
-        step.sample.weight *= step.choice;
+        let (mut step, factor) = tried.take(candidates)?;
+        step.choice = factor;
+        step.sample.weight *= factor;
         Some(step)
     }
 

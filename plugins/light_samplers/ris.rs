@@ -36,8 +36,7 @@ use super::light_tree::LightTree;
 use lucerna_core::interfaces::{
     Light, LightPoint, LightSample, LightSampler, LightSelection, LightVertex, long_number,
 };
-use lucerna_core::math::{ONE_MINUS_EPSILON, Vec2};
-use lucerna_core::sampling::Stream;
+use lucerna_core::sampling::{Reservoir, Stream, r2};
 use lucerna_core::scene::{Built, Constructor, EmitterId, ObjectKind, Param, Plugin, Properties, Scene};
 use std::sync::Arc;
 
@@ -74,9 +73,6 @@ struct Resampled {
     candidates: u32,
 }
 
-/// The first number of the R2 sequence: powers of the inverse of the root of x³ = x + 1.
-const LATTICE: Vec2 = Vec2::new(0.754_877_7, 0.569_840_3);
-
 impl LightSelection for Resampled {
     fn in_parts(&self) -> bool {
         self.inner.in_parts()
@@ -99,31 +95,17 @@ impl LightSelection for Resampled {
         stream: &mut Stream<'_>,
         worth: &dyn Fn(&LightSample) -> f32,
     ) -> Option<LightSample> {
-        let (u, place, mut u_kept) = (long_number(stream.next_2d()), stream.next_2d(), stream.next_1d());
-        let mut sum = 0.0;
-        let mut kept: Option<(LightSample, f32)> = None;
+        let (u, place) = (long_number(stream.next_2d()), stream.next_2d());
+        let mut candidates = Reservoir::new(stream.next_1d());
         for i in 0..self.candidates {
             let u = (f64::from(i) + u) / f64::from(self.candidates);
             let Some((light, pmf)) = self.inner.choose(from, u) else { continue };
-            let u2 = (place + LATTICE * i as f32).fract().min(Vec2::splat(ONE_MINUS_EPSILON));
-            let Some(sample) = scene.sample_light(light, pmf, from.p, u2) else { continue };
+            let Some(sample) = scene.sample_light(light, pmf, from.p, r2(place, i)) else { continue };
             let w = worth(&sample);
-            if !(w > 0.0 && w.is_finite()) {
-                continue;
-            }
-            sum += w;
-            // One pass: the newer one is kept with its share of what there is so far, and the number is used up evenly.
-            let p_newer = w / sum;
-            if u_kept < p_newer {
-                u_kept /= p_newer;
-                kept = Some((sample, w));
-            } else {
-                u_kept = (u_kept - p_newer) / (1.0 - p_newer);
-            }
-            u_kept = u_kept.min(ONE_MINUS_EPSILON);
+            candidates.offer(sample, w);
         }
-        let (mut sample, w) = kept?;
-        sample.weight *= sum / (w * self.candidates as f32);
+        let (mut sample, factor) = candidates.take(self.candidates)?;
+        sample.weight *= factor;
         sample.weight.is_finite().then_some(sample)
     }
 
