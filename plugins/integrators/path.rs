@@ -24,12 +24,11 @@
 //! ```
 
 use super::common::{COMMON, PATH, PathLimits, timeout};
-use super::decides::ByThroughput;
 use super::directions::Unguided;
 use super::guided::Guided;
 use super::lights::{ByScene, LIGHTS, Lights};
 use super::path_kernel::trace;
-use crate::roulettes::ByAlbedo;
+use crate::roulettes::{ByAlbedo, ByThroughput};
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{Arena, CameraRay, Guide, Integrator, Radiance, RadianceEstimator, Roulette, Subjects};
 use lucerna_core::render::{

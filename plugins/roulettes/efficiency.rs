@@ -17,7 +17,7 @@
 //! </integrator>
 //! ```
 
-use super::{limited, survival, unlearnt};
+use super::{limited, survival_after_branches, unlearnt};
 use crate::guides::outlook_alone;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{Guide, Outlook, PathState, Roulette};
@@ -58,6 +58,6 @@ impl Roulette for Efficiency {
     }
 
     fn survival(&self, path: &PathState, delta: bool) -> f32 {
-        if delta { survival(path.prospects, path.eta) } else { 1.0 }
+        survival_after_branches(path, delta)
     }
 }
