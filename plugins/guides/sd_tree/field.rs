@@ -37,7 +37,7 @@ impl GuideField for Field {
         let normal = hit.frame.n * 1f32.copysign(hit.wi.z);
         // The integral of the factor over all directions.
         let (cosines, reach) = if self.cosine && one_sided { (cosines(normal), PI) } else { (&[1.0; CELLS], 4.0 * PI) };
-        Some(arena.alloc(Here { reach, ..Here::new(tree, leaf.p_guide, cosines)? }))
+        Some(arena.alloc(Here::new(tree, leaf.p_guide, cosines, reach)?))
     }
 
     fn incident(&self, p: Vec3, d: Vec3) -> Option<f32> {
@@ -86,22 +86,14 @@ struct Here<'g> {
 impl<'g> Here<'g> {
     /// `None` if no light comes from where it would be scattered.
     #[inline]
-    fn new(tree: &'g Quadtree, p_guide: f32, cosines: &'g [f32; CELLS]) -> Option<Self> {
+    fn new(tree: &'g Quadtree, p_guide: f32, cosines: &'g [f32; CELLS], reach: f32) -> Option<Self> {
         let mut rows = [0.0; EDGE];
         for (j, row) in rows.iter_mut().enumerate() {
             *row = sum(&product(tree, cosines, j));
         }
         let total = sum(&rows);
         let scale = UNIFORM * CELLS as f32 / total;
-        (total > 0.0 && scale.is_finite()).then_some(Here {
-            tree,
-            cosines,
-            p_guide,
-            rows,
-            total,
-            scale,
-            reach: 4.0 * PI,
-        })
+        (total > 0.0 && scale.is_finite()).then_some(Here { tree, cosines, p_guide, rows, total, scale, reach })
     }
 }
 
