@@ -5,6 +5,7 @@ use super::directions::{Directions, Step, Unguided};
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{
     Arena, Bxdf, BxdfSample, Goal, GuidedDirections, Lobes, MOST_GUIDED, Outlook, RecordKind, SurfaceHit, Transport,
+    is_guided,
 };
 use lucerna_core::math::{ONE_MINUS_EPSILON, Vec2, Vec3};
 use lucerna_core::render::{Guidance, Notebook, Place, Scattering};
@@ -44,11 +45,10 @@ impl<'a> Directions for Guided<'a> {
         let lobes = bxdf.lobes();
         let hybrid = lobes.has_delta();
         let directs = self.guidance.subjects.directions;
-        if !directs || !lobes.is_smooth() || bxdf.roughness() < self.guidance.least_roughness {
+        if !directs || !is_guided(bxdf, lobes, self.guidance.least_roughness) {
             return Learnt { guide: None, teaches: false, hybrid };
         }
-        let one_sided = !lobes.and(Lobes::SMOOTH).intersects(Lobes::TRANSMISSION);
-        let guide = self.guidance.field.at(hit, one_sided, self.arena).and_then(|guide| {
+        let guide = self.guidance.field.at(hit, lobes.is_one_sided(), self.arena).and_then(|guide| {
             let p = guide.p_guide().clamp(0.0, MOST_GUIDED);
             (p > 0.0).then_some((guide, p))
         });

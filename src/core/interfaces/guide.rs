@@ -8,7 +8,7 @@
 //! A guide never stands alone. Directions come from the mixture of the guide and the BSDF, and the probability of the
 //! guide is at most [`MOST_GUIDED`], so that whatever a field has learnt, right or wrong, no light is lost.
 
-use super::{Arena, Outlook, SurfaceHit};
+use super::{Arena, Bxdf, Lobes, Outlook, SurfaceHit};
 use crate::io::{IoError, Result};
 use crate::math::{Aabb, Vec2, Vec3};
 use std::sync::Arc;
@@ -187,6 +187,13 @@ pub trait GuidedDirections {
     fn light(&self, d: Vec3) -> f32 {
         4.0 * std::f32::consts::PI * self.pdf(d)
     }
+}
+
+/// Whether directions at a BSDF with these lobes are guided: it scatters into more than single directions, and no lobe
+/// is narrower than [`Training::least_roughness`].
+#[inline]
+pub fn is_guided(bxdf: &dyn Bxdf, lobes: Lobes, least_roughness: f32) -> bool {
+    lobes.is_smooth() && bxdf.roughness() >= least_roughness
 }
 
 /// What a path has found out at one vertex.
