@@ -1,5 +1,5 @@
-//! Directions from the mixture of a guide and the BSDF, or chosen among several by their product; and notes of what they
-//! find.
+//! Directions from the mixture of a guide and the BSDF, or chosen among several by their product; and notes of what
+//! they find.
 
 use super::directions::{Directions, Step, Unguided};
 use lucerna_core::color::Rgb;
@@ -107,22 +107,24 @@ impl<'a> Directions for Guided<'a> {
         Some(self.guidance.candidates).filter(|candidates| *candidates > 1)
     }
 
-    /// Resampled importance sampling (Talbot, Cline, Egbert 2005) of the product of the BSDF and the light that was learnt.
+    /// Resampled importance sampling (Talbot, Cline, Egbert 2005) of the product of the BSDF and the light that was
+    /// learnt.
     ///
-    /// Each of M candidates i is drawn as [`sample`](Directions::sample) does, and has the contribution c(i), of which the
-    /// expectation is what is sought. Candidate j is chosen with probability w(j)/Σw(i) and counts c(j) Σw(i)/(M w(j)).
-    /// The expectation of that, given the candidates, is Σc(j)/M, if w(j) > 0 wherever c(j) ≠ 0; so it is what is sought,
-    /// whatever w is, and also if candidates depend on each other: they are spread evenly over the random numbers.
+    /// Each of M candidates i is drawn as [`sample`](Directions::sample) does, and has the contribution c(i), of which
+    /// the expectation is what is sought. Candidate j is chosen with probability w(j)/Σw(i) and counts c(j) Σw(i)/(M
+    /// w(j)). The expectation of that, given the candidates, is Σc(j)/M, if w(j) > 0 wherever c(j) ≠ 0; so it is what
+    /// is sought, whatever w is, and also if candidates depend on each other: they are spread evenly over the random
+    /// numbers.
     ///
-    /// Here w(i) is c(i) without the light, times what is expected of it: with the probability of the guide, the light that
-    /// was learnt over its mean, or else 1. For a diffuse BSDF that is what the mixture follows already, and the choice
-    /// changes nothing; it helps the more, the less the BSDF is like a cosine.
+    /// Here w(i) is c(i) without the light, times what is expected of it: with the probability of the guide, the light
+    /// that was learnt over its mean, or else 1. For a diffuse BSDF that is what the mixture follows already, and the
+    /// choice changes nothing; it helps the more, the less the BSDF is like a cosine.
     ///
-    /// The density of the direction that comes out has no closed form, but none is asked for. In c(j) light met by chance
-    /// is weighted against emitter sampling by the density of *one candidate*, the mixture's, and emitter sampling is
-    /// weighted against the same. The two weights sum to one for each direction, which is all that the proof of multiple
-    /// importance sampling needs (Veach 1997, section 9.2). It costs that emitter sampling counts for more than it would
-    /// if the better density were known.
+    /// The density of the direction that comes out has no closed form, but none is asked for. In c(j) light met by
+    /// chance is weighted against emitter sampling by the density of *one candidate*, the mixture's, and emitter
+    /// sampling is weighted against the same. The two weights sum to one for each direction, which is all that the
+    /// proof of multiple importance sampling needs (Veach 1997, section 9.2). It costs that emitter sampling counts for
+    /// more than it would if the better density were known.
     #[inline]
     fn resample(
         here: Learnt<'a>,
@@ -147,10 +149,10 @@ impl<'a> Directions for Guided<'a> {
         Some(step)
     }
 
-    /// A guide takes directions from which much light comes more often than the BSDF would, and the throughput falls by as
-    /// much: judged by it, roulette would end the paths that matter (Müller 2019, section 10.6). What a path is worth, its
-    /// throughput times the light ahead, falls by the albedo only. Where the guide was wrong the throughput is larger, and
-    /// counts.
+    /// A guide takes directions from which much light comes more often than the BSDF would, and the throughput falls by
+    /// as much: judged by it, roulette would end the paths that matter (Müller 2019, section 10.6). What a path is
+    /// worth, its throughput times the light ahead, falls by the albedo only. Where the guide was wrong the throughput
+    /// is larger, and counts.
     #[inline]
     fn prospects(&self, throughput: Rgb) -> Rgb {
         let Rgb { r, g, b } = self.prospects;

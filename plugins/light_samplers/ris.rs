@@ -1,27 +1,29 @@
 //! `ris`: of several candidates, the light that would bring most if nothing stood between is the likeliest.
 //!
 //! Resampled importance sampling (Talbot, Cline, Egbert 2005). M candidates x_1 … x_M come from another light sampler,
-//! with density p. Each is worth w_i = p̂(x_i) / p(x_i), where p̂ is the luminance that it would add to the path if it were
-//! visible: emission, BSDF and geometry. One, x_j, is kept with chance w_j / Σ w_i, one shadow ray is traced, and its light
-//! is multiplied by Σ w_i / (M w_j). So M BSDF evaluations are paid for one shadow ray to a place where it counts.
+//! with density p. Each is worth w_i = p̂(x_i) / p(x_i), where p̂ is the luminance that it would add to the path if it
+//! were visible: emission, BSDF and geometry. One, x_j, is kept with chance w_j / Σ w_i, one shadow ray is traced, and
+//! its light is multiplied by Σ w_i / (M w_j). So M BSDF evaluations are paid for one shadow ray to a place where it
+//! counts.
 //!
 //! **The weight against BSDF sampling.** The density of what is kept has no closed form, and none is needed. For any
-//! function g the mean of g(x_j) / p̂(x_j) · Σ w_i / M is ∫ g, if p̂ > 0 where g ≠ 0. Let g = f · m, with f the light that
-//! arrives and m any weight: sampling lights then gives ∫ f m, sampling the BSDF ∫ f (1 − m), and both together are right as
-//! long as both use *the same* m, a function of the place alone. It is the power heuristic on p, the candidates' density,
-//! which is known at any place, also at one hit by chance. The m is part of p̂, so that no shadow ray goes where BSDF
-//! sampling does the work. What is lost against a weight that knew the density of x_j is variance only.
+//! function g the mean of g(x_j) / p̂(x_j) · Σ w_i / M is ∫ g, if p̂ > 0 where g ≠ 0. Let g = f · m, with f the light
+//! that arrives and m any weight: sampling lights then gives ∫ f m, sampling the BSDF ∫ f (1 − m), and both together
+//! are right as long as both use *the same* m, a function of the place alone. It is the power heuristic on p, the
+//! candidates' density, which is known at any place, also at one hit by chance. The m is part of p̂, so that no shadow
+//! ray goes where BSDF sampling does the work. What is lost against a weight that knew the density of x_j is variance
+//! only.
 //!
-//! Candidates of one vertex share their random numbers: the choices of lights are spread evenly over [0, 1), the places on
-//! lights follow a rotated lattice (Roberts 2018, "R2"). Each alone is uniform, which is all that the mean asks for.
+//! Candidates of one vertex share their random numbers: the choices of lights are spread evenly over [0, 1), the places
+//! on lights follow a rotated lattice (Roberts 2018, "R2"). Each alone is uniform, which is all that the mean asks for.
 //!
 //! | parameter | type | default | meaning |
 //! |---|---|---|---|
 //! | `candidates` | integer | 8 | M, at least 1 |
 //! | nested `light_sampler` | | `light_tree` | where candidates come from |
 //!
-//! Against the paper: candidates are stratified; p̂ includes the weight against BSDF sampling; one of them is kept, never
-//! more.
+//! Against the paper: candidates are stratified; p̂ includes the weight against BSDF sampling; one of them is kept,
+//! never more.
 //!
 //! ```xml
 //! <integrator type="path">

@@ -66,8 +66,8 @@ fn whole(spp: u32, threads: usize, kept: Kept) -> Vec<u32> {
     bits
 }
 
-/// A file is a by-product; runs that begin with it have the same bits for any number of threads; it learns on when it can
-/// learn from more, and never when it is frozen.
+/// A file is a by-product; runs that begin with it have the same bits for any number of threads; it learns on when it
+/// can learn from more, and never when it is frozen.
 #[test]
 fn hc_p08_runs_from_the_same_file_have_the_same_bits() {
     let folder = folder("bits");
@@ -151,8 +151,8 @@ fn what_is_recalled_learns_on_alike() {
     assert!(recalled.save() == learner.save() && recalled.save() != saved);
 }
 
-/// Any bytes are refused or give a field that is sound, may be sampled and learns on; and nothing as large as they say is
-/// allocated.
+/// Any bytes are refused or give a field that is sound, may be sampled and learns on; and nothing as large as they say
+/// is allocated.
 #[test]
 fn hc_i22_damaged_files_are_refused_or_harmless() {
     const VERSIONS: usize = 4000;
@@ -194,9 +194,9 @@ fn checkpoint(path: &Path, every: f64) -> Checkpoint {
     Checkpoint { path: path.to_owned(), every, of: vec![("seed".to_owned(), "1".to_owned())] }
 }
 
-/// Each run is interrupted after these numbers of samples per pixel, at the end of a pass, or after as many samples as is
-/// told for a number of pixels, inside of one: the picture, the numbers and what was learnt are those of a run without
-/// interruption.
+/// Each run is interrupted after these numbers of samples per pixel, at the end of a pass, or after as many samples as
+/// is told for a number of pixels, inside of one: the picture, the numbers and what was learnt are those of a run
+/// without interruption.
 fn interruptions_leave_no_trace(test: &str, nested: &str, after: &[&[u32]], inside: &[fn(u64) -> u64]) {
     const SPP: u32 = 64;
     let folder = folder(test);

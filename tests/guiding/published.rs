@@ -1,5 +1,5 @@
-//! Every combination of decisions agrees with `path` in published scenes, which are not part of the repository: a folder
-//! each in the folder that `LUCERNA_SCENES` names. Without it nothing is rendered, and the test says so.
+//! Every combination of decisions agrees with `path` in published scenes, which are not part of the repository: a
+//! folder each in the folder that `LUCERNA_SCENES` names. Without it nothing is rendered, and the test says so.
 
 use crate::support::render;
 use lucerna::compare::method::{Method, Methods};
@@ -12,7 +12,8 @@ use lucerna::core::stats::figures::measured;
 use lucerna::core::stats::images::{Scale, compare};
 use std::path::{Path, PathBuf};
 
-/// Of a small lamp in view, a pixel sees much or nothing: ten pictures of few samples would say little about their mean.
+/// Of a small lamp in view, a pixel sees much or nothing: ten pictures of few samples would say little about their
+/// mean.
 const PATH: &str = "path:hide_emitters=true";
 /// Pixels of a picture.
 const SIZE: [u32; 2] = [48, 32];

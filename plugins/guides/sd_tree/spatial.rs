@@ -29,8 +29,8 @@ pub struct SpatialTree {
     root: u32,
     nodes: Vec<[u32; 2]>,
     leaves: u32,
-    /// Where the search goes on for each cell of a grid of 8 × 8 × 8, and how many splits are above: nine, or as many as
-    /// the leaf has.
+    /// Where the search goes on for each cell of a grid of 8 × 8 × 8, and how many splits are above: nine, or as many
+    /// as the leaf has.
     top: Vec<(u32, u32)>,
 }
 
@@ -119,8 +119,8 @@ impl SpatialTree {
         (leaf & !LEAF, depth)
     }
 
-    /// The leaf at or below a node with so many splits above, or the node where that many `most` are reached. The bits of
-    /// coordinates that decide are the highest, and the next decision is that of the first coordinate.
+    /// The leaf at or below a node with so many splits above, or the node where that many `most` are reached. The bits
+    /// of coordinates that decide are the highest, and the next decision is that of the first coordinate.
     #[inline(always)]
     fn search(&self, mut node: u32, mut depth: u32, most: Option<u32>, [mut a, mut b, mut c]: Cell) -> (u32, u32) {
         while node & LEAF == 0 && most.is_none_or(|most| depth < most) {

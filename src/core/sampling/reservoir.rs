@@ -2,13 +2,13 @@
 
 use crate::math::{ONE_MINUS_EPSILON, Vec2};
 
-/// The first point of the R2 sequence, the two-dimensional Kronecker sequence of lowest discrepancy known: powers of one
-/// over the plastic number, the root of x³ = x + 1 (Roberts 2018, "The unreasonable effectiveness of quasirandom
+/// The first point of the R2 sequence, the two-dimensional Kronecker sequence of lowest discrepancy known: powers of
+/// one over the plastic number, the root of x³ = x + 1 (Roberts 2018, "The unreasonable effectiveness of quasirandom
 /// sequences").
 const R2: Vec2 = Vec2::new(0.754_877_7, 0.569_840_3);
 
-/// Point `i` of the R2 sequence, rotated by `shift` in [0, 1)²: any number of points that are spread evenly, each of them
-/// uniform if `shift` is.
+/// Point `i` of the R2 sequence, rotated by `shift` in [0, 1)²: any number of points that are spread evenly, each of
+/// them uniform if `shift` is.
 #[inline]
 pub fn r2(shift: Vec2, i: u32) -> Vec2 {
     (shift + R2 * i as f32).fract().min(Vec2::splat(ONE_MINUS_EPSILON))
@@ -49,8 +49,8 @@ impl<T> Reservoir<T> {
         self.rest = self.rest.min(ONE_MINUS_EPSILON);
     }
 
-    /// What is kept, and Σ worth/(M worth of it), one over M times its probability, if M candidates were drawn. `None` if
-    /// none had any worth.
+    /// What is kept, and Σ worth/(M worth of it), one over M times its probability, if M candidates were drawn. `None`
+    /// if none had any worth.
     #[inline]
     pub fn take(self, drawn: u32) -> Option<(T, f32)> {
         let total = self.total;
