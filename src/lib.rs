@@ -28,8 +28,9 @@ pub const DEFAULT_SCENE: &str = include_str!("../scenes/cornell-box.xml");
 
 /// Runs the command line with the given plugins.
 ///
-/// The exit code is 0 when all is done, 1 when `check` found a scene that differs, 2 when it could not be done (wrong arguments, a scene with mistakes, an output that
-/// cannot be written), and 3 when a render under `--strict-nan` met samples that were not finite or negative.
+/// The exit code is 0 when all is done, 1 when `check` found a scene that differs, 2 when it could not be done (wrong
+/// arguments, a scene with mistakes, an output that cannot be written), and 3 when a render under `--strict-nan` met
+/// samples that were not finite or negative.
 pub fn run(registry: core::scene::Registry) -> std::process::ExitCode {
     cli::run(&registry)
 }

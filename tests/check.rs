@@ -62,6 +62,29 @@ fn a_stored_reference_needs_no_python() {
     assert!(run.stdout.contains("% of pixels follow"), "{}", run.stdout);
 }
 
+/// Sample for sample with these samples and this seed: an image that is stored, or one that has to be rendered.
+#[test]
+fn exact_images_are_those_asked_for() {
+    let reference = |arguments: &[&str]| {
+        let run = check(nobody(), &[&[SCENE, "--exact", "--json"], arguments].concat());
+        let told = json(&run);
+        (
+            run.code,
+            told["scenes"][0]["reference"].as_str().map(str::to_owned),
+            told["scenes"][0]["spp"]["ours"].as_u64(),
+        )
+    };
+    let stored = |count: u32, spp: u64| (0, Some(format!("{count} stored images of scalar_rgb")), Some(spp));
+    assert_eq!(reference(&[]), stored(2, 4));
+    assert_eq!(reference(&["--spp", "1"]), stored(1, 1));
+    assert_eq!(reference(&["--seed", "3"]), stored(1, 4));
+    // None is stored, and there is nobody to render it.
+    for arguments in [["--spp", "2"], ["--seed", "1"]] {
+        let run = check(nobody(), &[&[SCENE, "--exact"][..], &arguments].concat());
+        assert!(run.code == 2 && run.stdout.contains("LUCERNA_REFERENCE_PYTHON=/nowhere"), "{}", run.stdout);
+    }
+}
+
 #[test]
 fn a_wrong_picture_is_told_shown_and_counted() {
     let scene = copy("wrong", "emitters/point", Some(1.02));

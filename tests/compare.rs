@@ -1,6 +1,8 @@
 //! `lucerna compare` as a user meets it: does it find what was planted, does it go on after it was killed, does it show
 //! what failed, and does its report open in a browser?
 
+mod support;
+
 use lucerna::compare::facts::Facts;
 use lucerna::compare::method::Methods;
 use lucerna::compare::results::SceneResult;
@@ -12,6 +14,7 @@ use serde_json::Value;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use support::program::chromium;
 
 /// A floor under a lamp, whose power is a parameter.
 const SCENE: &str = r#"<scene version="3.0.0">
@@ -334,10 +337,7 @@ fn tables_agree() {
 /// The page in a browser, if there is one: no errors on its console, pictures with the float values they have, keys.
 #[test]
 fn the_page_works_in_a_browser() {
-    let Some(browser) = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"]
-        .into_iter()
-        .find(|p| Path::new(p).exists())
-    else {
+    let Some(browser) = chromium() else {
         println!("skipped: there is no chromium");
         return;
     };

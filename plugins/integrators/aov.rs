@@ -7,9 +7,9 @@
 //!
 //! Types and channels: `albedo` (`.R .G .B`), `depth` (`.T`, as the integrator `depth`), `position`, `geo_normal`,
 //! `sh_normal`, `dp_du`, `dp_dv` (`.X .Y .Z`), `uv`, `duv_dx`, `duv_dy` (`.U .V`, the latter two for a step of one
-//! pixel over the square root of the samples per pixel), `prim_index`, `shape_index` (`.I`; shapes count from 1 in file order, 0 is the background). All are 0
-//! where nothing is hit. Indices are filtered like colours: use a box filter. The picture's colour is that of the
-//! first nested integrator, black without one.
+//! pixel over the square root of the samples per pixel), `prim_index`, `shape_index` (`.I`; shapes count from 1 in file
+//! order, 0 is the background). All are 0 where nothing is hit. Indices are filtered like colours: use a box filter.
+//! The picture's colour is that of the first nested integrator, black without one.
 //!
 //! ```xml
 //! <integrator type="aov">
@@ -174,7 +174,8 @@ fn write(kind: Kind, scene: &Scene, camera: &CameraRay, hit: &SurfaceHit, arena:
 }
 
 /// How far the texture coordinates are from those of the hit where an offset ray meets the tangent plane: the least
-/// squares solution of `dp = dp_du · du + dp_dv · dv` (Igehy 1999, "Tracing ray differentials"; zero where it has none).
+/// squares solution of `dp = dp_du · du + dp_dv · dv` (Igehy 1999, "Tracing ray differentials"; zero where it has
+/// none).
 fn uv_change(hit: &SurfaceHit, offset: Option<Ray>) -> Vec2 {
     let Some(ray) = offset else { return Vec2::ZERO };
     let t = hit.n.dot(hit.p - ray.o) / hit.n.dot(ray.d);

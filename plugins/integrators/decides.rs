@@ -1,6 +1,6 @@
 //! How the kernel of `path` asks roulette: compiled in where it goes by the throughput, so that others cost it nothing.
 
-use super::common::survival;
+use crate::roulettes::ByThroughput;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{Outlook, PathState, Roulette};
 
@@ -16,9 +16,7 @@ pub(super) trait Decides {
     fn survival(&self, path: &PathState, delta: bool) -> f32;
 }
 
-/// By the throughput, as the reference.
-pub(super) struct ByThroughput;
-
+/// As the reference.
 impl Decides for ByThroughput {
     const BRANCHES: bool = false;
 
@@ -28,8 +26,8 @@ impl Decides for ByThroughput {
     }
 
     #[inline(always)]
-    fn survival(&self, path: &PathState, _delta: bool) -> f32 {
-        survival(path.throughput, path.eta)
+    fn survival(&self, path: &PathState, delta: bool) -> f32 {
+        Roulette::survival(self, path, delta)
     }
 }
 

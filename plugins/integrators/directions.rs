@@ -1,20 +1,24 @@
-//! How a path chooses its directions: a question to whoever decides, and the answer where nothing is learnt.
+//! How a path chooses its directions: questions to whoever decides, with the answers where nothing is learnt.
 
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{Bxdf, BxdfSample, Goal, Outlook, SurfaceHit, Transport};
 use lucerna_core::math::{Vec2, Vec3};
 use lucerna_core::render::Place;
 
-/// Who decides in which direction a path goes on, and keeps notes.
+/// Who decides in which direction a path goes on, and keeps notes. What has an answer here has that where nothing is
+/// learnt.
 pub(super) trait Directions {
     /// What is known at a vertex: read once, then used for all that happens there.
     type Here: Copy;
 
-    /// Reads it. `smooth` says whether the BSDF has a lobe with a density here.
+    /// Reads it.
     fn here(&self, hit: &SurfaceHit, bxdf: &dyn Bxdf) -> Self::Here;
 
     /// Whether lights are sampled that a ray can also run into.
-    fn samples_emitters(&self) -> bool;
+    #[inline(always)]
+    fn samples_emitters(&self) -> bool {
+        true
+    }
 
     /// Density of world direction `d` in which the BSDF alone has density `pdf_bsdf`.
     fn mixed_pdf(here: Self::Here, d: Vec3, pdf_bsdf: f32) -> f32;
@@ -23,56 +27,88 @@ pub(super) trait Directions {
     fn sample(here: Self::Here, hit: &SurfaceHit, bxdf: &dyn Bxdf, u1: f32, u2: Vec2) -> Option<Step>;
 
     /// Candidates for that at a vertex, if there are several: one is [resampled](Self::resample).
-    fn candidates(&self) -> Option<u32>;
+    #[inline(always)]
+    fn candidates(&self) -> Option<u32> {
+        None
+    }
 
-    /// Where the path goes on, chosen among so many candidates by `choice`.
+    /// Where the path goes on, chosen among so many candidates by `choice`; the first of them, if nothing is known to
+    /// choose by.
+    #[inline(always)]
     fn resample(
         here: Self::Here,
         hit: &SurfaceHit,
         bxdf: &dyn Bxdf,
-        candidates: u32,
-        numbers: (f32, Vec2),
-        choice: f32,
-    ) -> Option<Step>;
+        _candidates: u32,
+        (u1, u2): (f32, Vec2),
+        _choice: f32,
+    ) -> Option<Step> {
+        Self::sample(here, hit, bxdf, u1, u2)
+    }
 
     /// What the throughput, which is this, would be about if directions came from the BSDF; not less than it is.
-    fn prospects(&self, throughput: Rgb) -> Rgb;
+    #[inline(always)]
+    fn prospects(&self, throughput: Rgb) -> Rgb {
+        throughput
+    }
 
     /// What has to be known to go back to this vertex.
-    fn mark(&self) -> Rgb;
+    #[inline(always)]
+    fn mark(&self) -> Rgb {
+        Rgb::WHITE
+    }
 
     /// Goes back to a vertex where [`mark`](Self::mark) said this.
-    fn resume(&mut self, prospects: Rgb);
+    #[inline(always)]
+    fn resume(&mut self, _prospects: Rgb) {}
 
     /// What is known of the pixel.
-    fn goal(&self) -> Goal;
+    #[inline(always)]
+    fn goal(&self) -> Goal {
+        Goal::default()
+    }
 
     /// Whether what scattering brings is learnt, so that paths may split or end before they are scattered.
-    fn looks_ahead(&self) -> bool;
+    #[inline(always)]
+    fn looks_ahead(&self) -> bool {
+        false
+    }
 
     /// Whether notes are kept.
-    fn learns(&self) -> bool;
+    #[inline(always)]
+    fn learns(&self) -> bool {
+        false
+    }
 
     /// What scattering at a vertex brings, as far as is known.
-    fn outlook(&self, place: &Place) -> Option<Outlook>;
+    #[inline(always)]
+    fn outlook(&self, _place: &Place) -> Option<Outlook> {
+        None
+    }
 
     /// Notes that so many branches go on from a vertex, each with this share, after so many rays.
-    fn note_fork(&mut self, place: Place, count: u32, share: f32, rays: u32);
+    #[inline(always)]
+    fn note_fork(&mut self, _place: Place, _count: u32, _share: f32, _rays: u32) {}
 
     /// Notes light of a sampled emitter.
-    fn note_direct(&mut self, light: Rgb);
+    #[inline(always)]
+    fn note_direct(&mut self, _light: Rgb) {}
 
     /// Notes where the path goes on.
-    fn note_step(&mut self, here: Self::Here, hit: &SurfaceHit, bxdf: &dyn Bxdf, step: &Step);
+    #[inline(always)]
+    fn note_step(&mut self, _here: Self::Here, _hit: &SurfaceHit, _bxdf: &dyn Bxdf, _step: &Step) {}
 
     /// Notes that roulette was survived.
-    fn note_survival(&mut self, q: f32);
+    #[inline(always)]
+    fn note_survival(&mut self, _q: f32) {}
 
     /// Notes light that was found by chance.
-    fn note_met(&mut self, light: Rgb, alone: bool);
+    #[inline(always)]
+    fn note_met(&mut self, _light: Rgb, _alone: bool) {}
 
     /// Notes the end of the path, or of a branch, after so many rays.
-    fn note_end(&mut self, rays: u32);
+    #[inline(always)]
+    fn note_end(&mut self, _rays: u32) {}
 }
 
 /// A direction that was chosen.
@@ -99,11 +135,6 @@ impl Directions for Unguided {
     fn here(&self, _hit: &SurfaceHit, _bxdf: &dyn Bxdf) {}
 
     #[inline(always)]
-    fn samples_emitters(&self) -> bool {
-        true
-    }
-
-    #[inline(always)]
     fn mixed_pdf((): (), _d: Vec3, pdf_bsdf: f32) -> f32 {
         pdf_bsdf
     }
@@ -113,72 +144,4 @@ impl Directions for Unguided {
         let sample = bxdf.sample(hit.wi, u1, u2, Transport::Radiance)?;
         Some(Step { d: hit.to_world(sample.wo), pdf_bsdf: sample.pdf, pdf_guide: 0.0, choice: 1.0, sample })
     }
-
-    #[inline(always)]
-    fn candidates(&self) -> Option<u32> {
-        None
-    }
-
-    #[inline(always)]
-    fn resample(
-        (): (),
-        hit: &SurfaceHit,
-        bxdf: &dyn Bxdf,
-        _candidates: u32,
-        (u1, u2): (f32, Vec2),
-        _choice: f32,
-    ) -> Option<Step> {
-        Self::sample((), hit, bxdf, u1, u2)
-    }
-
-    #[inline(always)]
-    fn prospects(&self, throughput: Rgb) -> Rgb {
-        throughput
-    }
-
-    #[inline(always)]
-    fn mark(&self) -> Rgb {
-        Rgb::WHITE
-    }
-
-    #[inline(always)]
-    fn resume(&mut self, _prospects: Rgb) {}
-
-    #[inline(always)]
-    fn goal(&self) -> Goal {
-        Goal::default()
-    }
-
-    #[inline(always)]
-    fn looks_ahead(&self) -> bool {
-        false
-    }
-
-    #[inline(always)]
-    fn learns(&self) -> bool {
-        false
-    }
-
-    #[inline(always)]
-    fn outlook(&self, _place: &Place) -> Option<Outlook> {
-        None
-    }
-
-    #[inline(always)]
-    fn note_fork(&mut self, _place: Place, _count: u32, _share: f32, _rays: u32) {}
-
-    #[inline(always)]
-    fn note_direct(&mut self, _light: Rgb) {}
-
-    #[inline(always)]
-    fn note_step(&mut self, (): (), _hit: &SurfaceHit, _bxdf: &dyn Bxdf, _step: &Step) {}
-
-    #[inline(always)]
-    fn note_survival(&mut self, _q: f32) {}
-
-    #[inline(always)]
-    fn note_met(&mut self, _light: Rgb, _alone: bool) {}
-
-    #[inline(always)]
-    fn note_end(&mut self, _rays: u32) {}
 }

@@ -1,13 +1,15 @@
-//! Directions from the mixture of a guide and the BSDF, or chosen among several by their product; and notes of what they
-//! find.
+//! Directions from the mixture of a guide and the BSDF, or chosen among several by their product; and notes of what
+//! they find.
 
 use super::directions::{Directions, Step, Unguided};
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{
     Arena, Bxdf, BxdfSample, Goal, GuidedDirections, Lobes, MOST_GUIDED, Outlook, RecordKind, SurfaceHit, Transport,
+    is_guided,
 };
 use lucerna_core::math::{ONE_MINUS_EPSILON, Vec2, Vec3};
 use lucerna_core::render::{Guidance, Notebook, Place, Scattering};
+use lucerna_core::sampling::{Reservoir, r2};
 
 /// Directions come from the mixture of a guide and the BSDF.
 pub(super) struct Guided<'a> {
@@ -20,10 +22,6 @@ pub(super) struct Guided<'a> {
     /// What the throughput would be about if directions had been chosen by the BSDF.
     pub prospects: Rgb,
 }
-
-/// The two-dimensional Kronecker sequence of lowest discrepancy known: powers of one over the plastic number (Roberts
-/// 2018, "The unreasonable effectiveness of quasirandom sequences").
-const PLASTIC: Vec2 = Vec2::new(0.754_877_7, 0.569_840_3);
 
 /// The least that is left of a path's prospects at a vertex: whatever an albedo says, roulette gives it a chance.
 const LEAST_PROSPECTS: f32 = 0.05;
@@ -47,11 +45,10 @@ impl<'a> Directions for Guided<'a> {
         let lobes = bxdf.lobes();
         let hybrid = lobes.has_delta();
         let directs = self.guidance.subjects.directions;
-        if !directs || !lobes.is_smooth() || bxdf.roughness() < self.guidance.least_roughness {
+        if !directs || !is_guided(bxdf, lobes, self.guidance.least_roughness) {
             return Learnt { guide: None, teaches: false, hybrid };
         }
-        let one_sided = !lobes.and(Lobes::SMOOTH).intersects(Lobes::TRANSMISSION);
-        let guide = self.guidance.field.at(hit, one_sided, self.arena).and_then(|guide| {
+        let guide = self.guidance.field.at(hit, lobes.is_one_sided(), self.arena).and_then(|guide| {
             let p = guide.p_guide().clamp(0.0, MOST_GUIDED);
             (p > 0.0).then_some((guide, p))
         });
@@ -110,22 +107,24 @@ impl<'a> Directions for Guided<'a> {
         Some(self.guidance.candidates).filter(|candidates| *candidates > 1)
     }
 
-    /// Resampled importance sampling (Talbot, Cline, Egbert 2005) of the product of the BSDF and the light that was learnt.
+    /// Resampled importance sampling (Talbot, Cline, Egbert 2005) of the product of the BSDF and the light that was
+    /// learnt.
     ///
-    /// Each of M candidates i is drawn as [`sample`](Directions::sample) does, and has the contribution c(i), of which the
-    /// expectation is what is sought. Candidate j is chosen with probability w(j)/Σw(i) and counts c(j) Σw(i)/(M w(j)).
-    /// The expectation of that, given the candidates, is Σc(j)/M, if w(j) > 0 wherever c(j) ≠ 0; so it is what is sought,
-    /// whatever w is, and also if candidates depend on each other: they are spread evenly over the random numbers.
+    /// Each of M candidates i is drawn as [`sample`](Directions::sample) does, and has the contribution c(i), of which
+    /// the expectation is what is sought. Candidate j is chosen with probability w(j)/Σw(i) and counts c(j) Σw(i)/(M
+    /// w(j)). The expectation of that, given the candidates, is Σc(j)/M, if w(j) > 0 wherever c(j) ≠ 0; so it is what
+    /// is sought, whatever w is, and also if candidates depend on each other: they are spread evenly over the random
+    /// numbers.
     ///
-    /// Here w(i) is c(i) without the light, times what is expected of it: with the probability of the guide, the light that
-    /// was learnt over its mean, or else 1. For a diffuse BSDF that is what the mixture follows already, and the choice
-    /// changes nothing; it helps the more, the less the BSDF is like a cosine.
+    /// Here w(i) is c(i) without the light, times what is expected of it: with the probability of the guide, the light
+    /// that was learnt over its mean, or else 1. For a diffuse BSDF that is what the mixture follows already, and the
+    /// choice changes nothing; it helps the more, the less the BSDF is like a cosine.
     ///
-    /// The density of the direction that comes out has no closed form, but none is asked for. In c(j) light met by chance
-    /// is weighted against emitter sampling by the density of *one candidate*, the mixture's, and emitter sampling is
-    /// weighted against the same. The two weights sum to one for each direction, which is all that the proof of multiple
-    /// importance sampling needs (Veach 1997, section 9.2). It costs that emitter sampling counts for more than it would
-    /// if the better density were known.
+    /// The density of the direction that comes out has no closed form, but none is asked for. In c(j) light met by
+    /// chance is weighted against emitter sampling by the density of *one candidate*, the mixture's, and emitter
+    /// sampling is weighted against the same. The two weights sum to one for each direction, which is all that the
+    /// proof of multiple importance sampling needs (Veach 1997, section 9.2). It costs that emitter sampling counts for
+    /// more than it would if the better density were known.
     #[inline]
     fn resample(
         here: Learnt<'a>,
@@ -136,40 +135,24 @@ impl<'a> Directions for Guided<'a> {
         choice: f32,
     ) -> Option<Step> {
         let Some((guide, p_guide)) = here.guide else { return Unguided::sample((), hit, bxdf, u1, u2) };
-        let (mut kept, mut kept_worth, mut total) = (None, 0.0, 0.0);
-        let mut rest = choice;
+        let mut tried = Reservoir::new(choice);
         for i in 0..candidates {
-            let shift = i as f32;
-            let u1 = (u1 + shift / candidates as f32).fract().min(ONE_MINUS_EPSILON);
-            let u2 = (u2 + shift * PLASTIC).fract().min(Vec2::splat(ONE_MINUS_EPSILON));
-            let Some(step) = Self::sample(here, hit, bxdf, u1, u2) else { continue };
+            let u1 = (u1 + i as f32 / candidates as f32).fract().min(ONE_MINUS_EPSILON);
+            let Some(step) = Self::sample(here, hit, bxdf, u1, r2(u2, i)) else { continue };
             let light = p_guide * guide.light(step.d).max(0.0) + (1.0 - p_guide);
             let worth = step.sample.weight.luminance() * light;
-            if !(worth > 0.0 && worth.is_finite()) {
-                // Nothing comes of it, or it is no number.
-                continue;
-            }
-            total += worth;
-            // A reservoir of one: with probability worth/total this one takes the place. What is left of the number is
-            // a random number again.
-            let p = worth / total;
-            if rest < p || kept.is_none() {
-                rest = (rest / p).min(ONE_MINUS_EPSILON);
-                (kept, kept_worth) = (Some(step), worth);
-            } else {
-                rest = ((rest - p) / (1.0 - p)).clamp(0.0, ONE_MINUS_EPSILON);
-            }
+            tried.offer(step, worth);
         }
-        let mut step = kept?;
-        step.choice = total / (candidates as f32 * kept_worth);
-        step.sample.weight *= step.choice;
+        let (mut step, factor) = tried.take(candidates)?;
+        step.choice = factor;
+        step.sample.weight *= factor;
         Some(step)
     }
 
-    /// A guide takes directions from which much light comes more often than the BSDF would, and the throughput falls by as
-    /// much: judged by it, roulette would end the paths that matter (Müller 2019, section 10.6). What a path is worth, its
-    /// throughput times the light ahead, falls by the albedo only. Where the guide was wrong the throughput is larger, and
-    /// counts.
+    /// A guide takes directions from which much light comes more often than the BSDF would, and the throughput falls by
+    /// as much: judged by it, roulette would end the paths that matter (Müller 2019, section 10.6). What a path is
+    /// worth, its throughput times the light ahead, falls by the albedo only. Where the guide was wrong the throughput
+    /// is larger, and counts.
     #[inline]
     fn prospects(&self, throughput: Rgb) -> Rgb {
         let Rgb { r, g, b } = self.prospects;

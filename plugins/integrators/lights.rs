@@ -54,13 +54,9 @@ impl PickLights for ByScene {
     }
 }
 
-/// Lobes that scatter light to the other side in more than one direction.
-const SMOOTH_TRANSMISSION: Lobes = Lobes::SMOOTH.and(Lobes::TRANSMISSION);
-
 impl PickLights for &dyn LightSelection {
     fn vertex(&self, hit: &SurfaceHit, lobes: Lobes) -> LightVertex {
-        let opaque = !lobes.intersects(SMOOTH_TRANSMISSION);
-        LightVertex { p: hit.p, n: if opaque { hit.frame.n * hit.wi.z.signum() } else { Vec3::ZERO } }
+        LightVertex { p: hit.p, n: if lobes.is_one_sided() { hit.frame.n * hit.wi.z.signum() } else { Vec3::ZERO } }
     }
 
     fn sample(

@@ -3,7 +3,8 @@
 //! At each vertex one light is sampled and one direction of the BSDF; where both could have found the same light they
 //! are combined by multiple importance sampling (Kajiya 1986; Veach 1997, chapter 9). Paths end by depth or by Russian
 //! roulette on the throughput. A sample that met nothing but surfaces that let it straight through, and no environment,
-//! is transparent: alpha 0 and, as in the reference, no colour. Surfaces only; `volpath` also looks through index-matched surfaces on the way to a light.
+//! is transparent: alpha 0 and, as in the reference, no colour. Surfaces only; `volpath` also looks through
+//! index-matched surfaces on the way to a light.
 //!
 //! With a nested guide directions come from a mixture of the BSDF and of what earlier samples have taught. The picture
 //! stays unbiased. Such a `path` cannot be nested itself, since its samples depend on each other.
@@ -24,12 +25,11 @@
 //! ```
 
 use super::common::{COMMON, PATH, PathLimits, timeout};
-use super::decides::ByThroughput;
 use super::directions::Unguided;
 use super::guided::Guided;
 use super::lights::{ByScene, LIGHTS, Lights};
 use super::path_kernel::trace;
-use crate::roulettes::ByAlbedo;
+use crate::roulettes::{ByAlbedo, ByThroughput};
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{Arena, CameraRay, Guide, Integrator, Radiance, RadianceEstimator, Roulette, Subjects};
 use lucerna_core::render::{

@@ -1,27 +1,29 @@
 //! `ris`: of several candidates, the light that would bring most if nothing stood between is the likeliest.
 //!
 //! Resampled importance sampling (Talbot, Cline, Egbert 2005). M candidates x_1 … x_M come from another light sampler,
-//! with density p. Each is worth w_i = p̂(x_i) / p(x_i), where p̂ is the luminance that it would add to the path if it were
-//! visible: emission, BSDF and geometry. One, x_j, is kept with chance w_j / Σ w_i, one shadow ray is traced, and its light
-//! is multiplied by Σ w_i / (M w_j). So M BSDF evaluations are paid for one shadow ray to a place where it counts.
+//! with density p. Each is worth w_i = p̂(x_i) / p(x_i), where p̂ is the luminance that it would add to the path if it
+//! were visible: emission, BSDF and geometry. One, x_j, is kept with chance w_j / Σ w_i, one shadow ray is traced, and
+//! its light is multiplied by Σ w_i / (M w_j). So M BSDF evaluations are paid for one shadow ray to a place where it
+//! counts.
 //!
 //! **The weight against BSDF sampling.** The density of what is kept has no closed form, and none is needed. For any
-//! function g the mean of g(x_j) / p̂(x_j) · Σ w_i / M is ∫ g, if p̂ > 0 where g ≠ 0. Let g = f · m, with f the light that
-//! arrives and m any weight: sampling lights then gives ∫ f m, sampling the BSDF ∫ f (1 − m), and both together are right as
-//! long as both use *the same* m, a function of the place alone. It is the power heuristic on p, the candidates' density,
-//! which is known at any place, also at one hit by chance. The m is part of p̂, so that no shadow ray goes where BSDF
-//! sampling does the work. What is lost against a weight that knew the density of x_j is variance only.
+//! function g the mean of g(x_j) / p̂(x_j) · Σ w_i / M is ∫ g, if p̂ > 0 where g ≠ 0. Let g = f · m, with f the light
+//! that arrives and m any weight: sampling lights then gives ∫ f m, sampling the BSDF ∫ f (1 − m), and both together
+//! are right as long as both use *the same* m, a function of the place alone. It is the power heuristic on p, the
+//! candidates' density, which is known at any place, also at one hit by chance. The m is part of p̂, so that no shadow
+//! ray goes where BSDF sampling does the work. What is lost against a weight that knew the density of x_j is variance
+//! only.
 //!
-//! Candidates of one vertex share their random numbers: the choices of lights are spread evenly over [0, 1), the places on
-//! lights follow a rotated lattice (Roberts 2018, "R2"). Each alone is uniform, which is all that the mean asks for.
+//! Candidates of one vertex share their random numbers: the choices of lights are spread evenly over [0, 1), the places
+//! on lights follow a rotated lattice (Roberts 2018, "R2"). Each alone is uniform, which is all that the mean asks for.
 //!
 //! | parameter | type | default | meaning |
 //! |---|---|---|---|
 //! | `candidates` | integer | 8 | M, at least 1 |
 //! | nested `light_sampler` | | `light_tree` | where candidates come from |
 //!
-//! Against the paper: candidates are stratified; p̂ includes the weight against BSDF sampling; one of them is kept, never
-//! more.
+//! Against the paper: candidates are stratified; p̂ includes the weight against BSDF sampling; one of them is kept,
+//! never more.
 //!
 //! ```xml
 //! <integrator type="path">
@@ -36,8 +38,7 @@ use super::light_tree::LightTree;
 use lucerna_core::interfaces::{
     Light, LightPoint, LightSample, LightSampler, LightSelection, LightVertex, long_number,
 };
-use lucerna_core::math::{ONE_MINUS_EPSILON, Vec2};
-use lucerna_core::sampling::Stream;
+use lucerna_core::sampling::{Reservoir, Stream, r2};
 use lucerna_core::scene::{Built, Constructor, EmitterId, ObjectKind, Param, Plugin, Properties, Scene};
 use std::sync::Arc;
 
@@ -74,9 +75,6 @@ struct Resampled {
     candidates: u32,
 }
 
-/// The first number of the R2 sequence: powers of the inverse of the root of x³ = x + 1.
-const LATTICE: Vec2 = Vec2::new(0.754_877_7, 0.569_840_3);
-
 impl LightSelection for Resampled {
     fn in_parts(&self) -> bool {
         self.inner.in_parts()
@@ -99,31 +97,17 @@ impl LightSelection for Resampled {
         stream: &mut Stream<'_>,
         worth: &dyn Fn(&LightSample) -> f32,
     ) -> Option<LightSample> {
-        let (u, place, mut u_kept) = (long_number(stream.next_2d()), stream.next_2d(), stream.next_1d());
-        let mut sum = 0.0;
-        let mut kept: Option<(LightSample, f32)> = None;
+        let (u, place) = (long_number(stream.next_2d()), stream.next_2d());
+        let mut candidates = Reservoir::new(stream.next_1d());
         for i in 0..self.candidates {
             let u = (f64::from(i) + u) / f64::from(self.candidates);
             let Some((light, pmf)) = self.inner.choose(from, u) else { continue };
-            let u2 = (place + LATTICE * i as f32).fract().min(Vec2::splat(ONE_MINUS_EPSILON));
-            let Some(sample) = scene.sample_light(light, pmf, from.p, u2) else { continue };
+            let Some(sample) = scene.sample_light(light, pmf, from.p, r2(place, i)) else { continue };
             let w = worth(&sample);
-            if !(w > 0.0 && w.is_finite()) {
-                continue;
-            }
-            sum += w;
-            // One pass: the newer one is kept with its share of what there is so far, and the number is used up evenly.
-            let p_newer = w / sum;
-            if u_kept < p_newer {
-                u_kept /= p_newer;
-                kept = Some((sample, w));
-            } else {
-                u_kept = (u_kept - p_newer) / (1.0 - p_newer);
-            }
-            u_kept = u_kept.min(ONE_MINUS_EPSILON);
+            candidates.offer(sample, w);
         }
-        let (mut sample, w) = kept?;
-        sample.weight *= sum / (w * self.candidates as f32);
+        let (mut sample, factor) = candidates.take(self.candidates)?;
+        sample.weight *= factor;
         sample.weight.is_finite().then_some(sample)
     }
 

@@ -1,9 +1,9 @@
 //! `albedo`: a path goes on with the probability that is the product of the albedos on its way.
 //!
-//! As `throughput`, but at guided vertices the throughput counts as if it fell by the albedo only: what a path is worth is
-//! its throughput times the light ahead, and a guide lowers the one where it raises the other (Müller 2019, "Practical
-//! Path Guiding in Production", section 10.6). Where the guide was wrong the throughput is larger, and counts. What a
-//! guided `path` does without a roulette; without a guide it is the same as `throughput`.
+//! As `throughput`, but at guided vertices the throughput counts as if it fell by the albedo only: what a path is worth
+//! is its throughput times the light ahead, and a guide lowers the one where it raises the other (Müller 2019,
+//! "Practical Path Guiding in Production", section 10.6). Where the guide was wrong the throughput is larger, and
+//! counts. What a guided `path` does without a roulette; without a guide it is the same as `throughput`.
 //!
 //! No parameters.
 //!

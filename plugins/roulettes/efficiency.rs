@@ -2,10 +2,11 @@
 //!
 //! Efficiency-aware Russian roulette and splitting (Rath, Grittmann, Herholz, Weier, Slusallek 2022). With v the mean
 //! relative variance of a sample and c its mean cost in rays, both of the picture, a path of throughput t in a pixel of
-//! luminance i goes on from a vertex with the probability t/i · √(second moment / cost · c/v) of what scattering there has
-//! brought; where that is above 1, it splits into t/i · √(variance / cost · c/v). The variance is that among the
-//! branches of vertices that have split, not that among the vertices of a cell. Limits and learning are as in `adjoint`,
-//! which needs no such figures and is mostly faster.
+//! luminance i goes on from a vertex with the probability t/i · √(second moment / cost · c/v) of what scattering there
+//! has brought; where that is above 1, it splits into t/i · √(variance / cost · c/v). The variance is that among the
+//! branches of vertices that have split, not that among the vertices of a cell. Limits and learning are as in
+//! `adjoint`, which needs no such figures. Which of them suits a scene tells
+//! `lucerna compare scene.xml -m path path+roulette=adjoint path+roulette=efficiency`.
 //!
 //! | parameter | type | default | meaning |
 //! |---|---|---|---|
@@ -17,7 +18,7 @@
 //! </integrator>
 //! ```
 
-use super::{limited, survival, unlearnt};
+use super::{limited, survival_after_branches, unlearnt};
 use crate::guides::outlook_alone;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{Guide, Outlook, PathState, Roulette};
@@ -58,6 +59,6 @@ impl Roulette for Efficiency {
     }
 
     fn survival(&self, path: &PathState, delta: bool) -> f32 {
-        if delta { survival(path.prospects, path.eta) } else { 1.0 }
+        survival_after_branches(path, delta)
     }
 }

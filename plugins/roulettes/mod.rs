@@ -12,6 +12,7 @@ pub(crate) use albedo::ByAlbedo;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{LEAST_SURVIVAL, PathState};
 use lucerna_core::scene::Plugin;
+pub(crate) use throughput::ByThroughput;
 
 /// The table of all of them.
 pub const PLUGINS: &[Plugin] = &[throughput::PLUGIN, albedo::PLUGIN, adjoint::PLUGIN, efficiency::PLUGIN];
@@ -31,6 +32,12 @@ const LONG: u32 = 64;
 /// [`LEAST_SURVIVAL`].
 fn unlearnt(path: &PathState) -> f32 {
     if path.due { survival(path.prospects, path.eta).max(LEAST_SURVIVAL) } else { 1.0 }
+}
+
+/// The survival of a path of which the number of branches has been decided already: delta lobes go by [`survival`], the
+/// others go on.
+fn survival_after_branches(path: &PathState, delta: bool) -> f32 {
+    if delta { survival(path.prospects, path.eta) } else { 1.0 }
 }
 
 /// An answer from what has been learnt, limited after many vertices.

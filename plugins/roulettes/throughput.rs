@@ -31,9 +31,11 @@ fn build(_p: &Properties<'_>) -> Built<dyn Roulette> {
     Ok(Arc::new(ByThroughput))
 }
 
-struct ByThroughput;
+/// The decision.
+pub(crate) struct ByThroughput;
 
 impl Roulette for ByThroughput {
+    #[inline]
     fn survival(&self, path: &PathState, _delta: bool) -> f32 {
         survival(path.throughput, path.eta)
     }

@@ -57,11 +57,11 @@ pub struct Options {
     pub reading: lucerna_core::scene::xml::LoadOptions,
     /// Width, and height if not the scene's aspect, instead of the scene's size.
     pub size: Option<(u32, Option<u32>)>,
-    /// Samples per pixel of all passes together, instead of as many as [`TARGET`] needs: of the reference, or of Lucerna
-    /// where the reference is stored.
+    /// Samples per pixel of all passes together, instead of as many as [`TARGET`] needs: of the reference, or of
+    /// Lucerna where the reference is stored. Sample for sample, of either.
     pub spp: Option<u32>,
-    /// First seed.
-    pub seed: u32,
+    /// First seed, 0 if unset; sample for sample, the only one.
+    pub seed: Option<u32>,
     /// The reference's variant; empty for the fastest one that works.
     pub variant: String,
     /// Sample for sample instead of statistically.
@@ -195,18 +195,18 @@ fn check_statistically(
     if let Some(entry) = &stored {
         ours = ours.at_size(registry, entry.size, options)?;
     }
-    let independent = ours.has_independent_pixels();
+    let (independent, seed) = (ours.has_independent_pixels(), options.seed.unwrap_or(0));
     let fixed = options.spp.filter(|_| stored.is_some());
     let look = |ours: &Ours, number: u32| -> Result<(Measured, Reference), Refusal> {
         let reference = match &stored {
             Some(entry) => entry.load()?,
             None => {
-                let total = options.spp.map_or_else(|| ours.plan(options.seed), Ok)?;
+                let total = options.spp.map_or_else(|| ours.plan(seed), Ok)?;
                 let spp = (total / PASSES).max(1);
-                reference::measure(ours, options, spp, options.seed.wrapping_add(number * FRESH))?
+                reference::measure(ours, options, spp, seed.wrapping_add(number * FRESH))?
             }
         };
-        let own = ours.measure_like(&reference, fixed, options.seed.wrapping_add(1000 + number * FRESH))?;
+        let own = ours.measure_like(&reference, fixed, seed.wrapping_add(1000 + number * FRESH))?;
         Ok((own, reference))
     };
     let with = |own: &Measured, reference: &Reference| {
@@ -231,7 +231,7 @@ fn check_statistically(
             notes.push("found again with fresh random numbers".to_owned());
             if !options.reference_offsets {
                 ours.use_reference_offsets();
-                let offset = ours.measure_like(&again, fixed, options.seed.wrapping_add(1000 + 2 * FRESH))?;
+                let offset = ours.measure_like(&again, fixed, seed.wrapping_add(1000 + 2 * FRESH))?;
                 if with(&offset, &again)?.agrees() {
                     verdict = Verdict::Offset;
                     notes.push("agrees if rays start as far off surfaces as the reference's do".to_owned());
@@ -274,11 +274,11 @@ fn check_exact(registry: &Registry, path: &std::path::Path, options: &Options) -
         shots.push((entry.load_exact()?, entry.seed, entry.spp, entry.size));
     }
     if shots.is_empty() {
-        let spp = options.spp.unwrap_or(4);
-        let (image, took) = reference::exact(&ours, options, spp)?;
-        description = format!("scalar_rgb, {spp} spp, seed {}", options.seed);
+        let (spp, seed) = (options.spp.unwrap_or(4), options.seed.unwrap_or(0));
+        let (image, took) = reference::exact(&ours, options, spp, seed)?;
+        description = format!("scalar_rgb, {spp} spp, seed {seed}");
         seconds[1] = took;
-        shots.push((image, options.seed, spp, ours.size()));
+        shots.push((image, seed, spp, ours.size()));
     }
     let mut worst: Option<(Agreement, Findings)> = None;
     let mut spp = 0;

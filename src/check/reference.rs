@@ -319,8 +319,8 @@ pub fn measure(ours: &Ours, options: &Options, spp: u32, seed: u32) -> Result<Re
 ///
 /// # Errors
 /// As [`measure`].
-pub fn exact(ours: &Ours, options: &Options, spp: u32) -> Result<(Image, f64), Refusal> {
-    let (_, mut answer) = render_scene(ours, options, "scalar_rgb", spp, &[options.seed])?;
+pub fn exact(ours: &Ours, options: &Options, spp: u32, seed: u32) -> Result<(Image, f64), Refusal> {
+    let (_, mut answer) = render_scene(ours, options, "scalar_rgb", spp, &[seed])?;
     let image = answer.images.pop().ok_or_else(|| Refusal::failed("the reference gave no picture"))?;
     Ok((image, answer.times.iter().sum()))
 }

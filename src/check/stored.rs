@@ -173,12 +173,16 @@ pub fn find(path: &Path, ours: &Ours, options: &Options) -> Result<Option<Entry>
     Ok(entries("image", path, ours, options)?.pop())
 }
 
-/// The stored images for a comparison sample for sample.
+/// The stored images for a comparison sample for sample: all, or those of the samples per pixel and the seed asked for.
 ///
 /// # Errors
 /// As [`find`].
 pub fn find_exact(path: &Path, ours: &Ours, options: &Options) -> Result<Vec<Entry>, Refusal> {
-    entries("exact", path, ours, options)
+    let mut found = entries("exact", path, ours, options)?;
+    found.retain(|entry| {
+        options.spp.is_none_or(|spp| spp == entry.spp) && options.seed.is_none_or(|seed| seed == entry.seed)
+    });
+    Ok(found)
 }
 
 /// Scenes of a repository whose reference is not the truth, and why: `(name, reason)`; a name may end in `*`.

@@ -45,13 +45,14 @@ pub struct Arguments {
     #[arg(long, value_name = "W[xH]", value_parser = size)]
     size: Option<(u32, Option<u32>)>,
 
-    /// Samples per pixel of the reference (where that is stored, of Lucerna), instead of as many as find 0.3 % in the mean
+    /// Samples per pixel of the reference (where that is stored, of Lucerna), instead of as many as find 0.3 % in the
+    /// mean. With --exact, of both: stored images of as many, and of --seed, or one rendered now
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     spp: Option<u32>,
 
-    /// Chooses the random numbers
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    seed: u32,
+    /// Chooses the random numbers; 0 by default
+    #[arg(long, value_name = "N")]
+    seed: Option<u32>,
 
     /// Variant of the reference; llvm_ad_rgb where that works, else scalar_rgb
     #[arg(long, value_name = "NAME")]

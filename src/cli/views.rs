@@ -19,7 +19,8 @@ pub struct ViewArguments {
     #[arg(long, value_name = "FILE", conflicts_with = "pixel")]
     error_vs: Option<PathBuf>,
 
-    /// End when the estimated relative mean squared error is so small; never before 16 samples per pixel. --spp or --seconds then are the most
+    /// End when the estimated relative mean squared error is so small; never before 16 samples per pixel. --spp or
+    /// --seconds then are the most
     #[arg(long, value_name = "X", value_parser = error, conflicts_with = "pixel")]
     pub target_relmse: Option<f64>,
 

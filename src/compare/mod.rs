@@ -4,11 +4,12 @@
 //! slows all, and ratios are taken between runs that stood next to each other. Each turn is a process of its own
 //! ([`turn`]), and all use the same number of threads.
 //!
-//! **Points.** The curves have points at 1, 2, 4, … samples per pixel up to the budget. Where the sampler gives a sequence, they
-//! are looked at on the way of one run, whose clock stands still meanwhile. Samplers that stratify a number of points which they have
-//! to know at the start, and peers, render each point from the beginning; that costs about as much again as the last one. A
-//! budget in seconds becomes a number of samples per pixel, once for each method: from a short trial, or from a whole run by
-//! the clock where samples depend on those before. The time that was in fact taken is what counts.
+//! **Points.** The curves have points at 1, 2, 4, … samples per pixel up to the budget. Where the sampler gives a
+//! sequence, they are looked at on the way of one run, whose clock stands still meanwhile. Samplers that stratify a
+//! number of points which they have to know at the start, and peers, render each point from the beginning; that costs
+//! about as much again as the last one. A budget in seconds becomes a number of samples per pixel, once for each
+//! method: from a short trial, or from a whole run by the clock where samples depend on those before. The time that was
+//! in fact taken is what counts.
 //!
 //! **Reference.** Given, or rendered until its noise does not matter ([`truth`]).
 //!
@@ -122,8 +123,8 @@ pub fn colour(image: &Image) -> Result<(Vec<String>, Vec<f32>), String> {
     Ok((names, pixels.flat_map(|pixel| order.iter().map(|&c| pixel[c])).collect()))
 }
 
-/// Samples per pixel a second, from a trial of about this many seconds: what runs of more and more samples come to. It has
-/// settled when more samples make it no faster; until then, what every run has to do once is much of its time.
+/// Samples per pixel a second, from a trial of about this many seconds: what runs of more and more samples come to. It
+/// has settled when more samples make it no faster; until then, what every run has to do once is much of its time.
 fn rate(subject: &Subject, seconds: f64) -> Result<f64, String> {
     const MOST: f64 = (1 << 22) as f64;
     const SETTLED: f64 = 1.3;
@@ -142,8 +143,8 @@ fn rate(subject: &Subject, seconds: f64) -> Result<f64, String> {
     }
 }
 
-/// Samples per pixel that fit into each time, from a run that the clock ends: what a run learns makes its samples slower or
-/// faster, and how much depends on how long it is.
+/// Samples per pixel that fit into each time, from a run that the clock ends: what a run learns makes its samples
+/// slower or faster, and how much depends on how long it is.
 fn fit(subject: &Subject, seconds: &[f64]) -> Result<Vec<u32>, String> {
     seconds.iter().map(|seconds| Ok(subject.counts_up_to(subject.samples_in(*seconds, u32::MAX)?))).collect()
 }

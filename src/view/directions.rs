@@ -1,13 +1,13 @@
-//! What a guide has learnt at points of a scene, as a picture: for each point where it lies, the density of directions that
-//! come from the guide, and that of the mixture with the BSDF that paths are drawn from.
+//! What a guide has learnt at points of a scene, as a picture: for each point where it lies, the density of directions
+//! that come from the guide, and that of the mixture with the BSDF that paths are drawn from.
 //!
-//! Directions are mapped to a rectangle by azimuth (to the right, 0 to 360° about z from x towards y) and the cosine with
-//! the z axis (upwards, −1 to 1), which keeps areas. Colours are densities over that of a uniform direction, 1/4π, on
-//! a logarithmic scale.
+//! Directions are mapped to a rectangle by azimuth (to the right, 0 to 360° about z from x towards y) and the cosine
+//! with the z axis (upwards, −1 to 1), which keeps areas. Colours are densities over that of a uniform direction, 1/4π,
+//! on a logarithmic scale.
 
 use super::letters::{self, LINE, STEP};
 use lucerna_core::image::{Image, srgb_to_linear};
-use lucerna_core::interfaces::{Arena, GuideField, Lobes, MOST_GUIDED, Sensor, SurfaceHit, Transport};
+use lucerna_core::interfaces::{Arena, GuideField, MOST_GUIDED, Sensor, SurfaceHit, Transport, is_guided};
 use lucerna_core::math::{UVec2, Vec2, Vec3};
 use lucerna_core::scene::Scene;
 use std::f32::consts::{PI, TAU};
@@ -16,8 +16,6 @@ use std::f32::consts::{PI, TAU};
 const MAP: [u32; 2] = [320, 160];
 /// Space on the left of a map, for its axis.
 const LEFT: u32 = 28;
-/// Pixels of a dot of a letter.
-const DOT: u32 = 2;
 /// Space around all.
 const MARGIN: u32 = 10;
 /// Points along each edge of a pixel of a map.
@@ -102,9 +100,8 @@ impl Learned<'_> {
         let arena = Arena::new();
         let bxdf = self.scene.bsdf(&hit).resolve(&hit, &arena);
         let lobes = bxdf.lobes();
-        let one_sided = !lobes.and(Lobes::SMOOTH).intersects(Lobes::TRANSMISSION);
-        let guided = lobes.is_smooth() && bxdf.roughness() >= self.least_roughness;
-        let guide = self.field.at(&hit, one_sided, &arena);
+        let guided = is_guided(bxdf, lobes, self.least_roughness);
+        let guide = self.field.at(&hit, lobes.is_one_sided(), &arena);
         let p_guide = guide.filter(|_| guided).map_or(0.0, |guide| guide.p_guide().clamp(0.0, MOST_GUIDED));
         let of_bsdf = |d: Vec3| bxdf.eval_pdf(hit.wi, hit.to_local(d), Transport::Radiance).1;
         if let Some(guide) = guide {
@@ -155,7 +152,7 @@ impl Learned<'_> {
     /// All places side by side.
     pub fn picture(&self, places: &[Place]) -> Image {
         let preview = [MAP[0], (MAP[0] * self.size.y / self.size.x.max(1)).clamp(32, MAP[0])];
-        let line = LINE * DOT + 2;
+        let line = LINE + 2;
         let block = line + MAP[1] + line + MARGIN;
         let column = LEFT + MAP[0] + 2 * MARGIN;
         let height = 2 * MARGIN + line + preview[1] + MARGIN + 2 * block + 2 * line + MARGIN;
@@ -246,13 +243,13 @@ impl Canvas {
 
     fn text(&mut self, left: u32, top: u32, text: &str) {
         for (x, y) in letters::dots(text) {
-            self.block(left + DOT * x, top + DOT * y, [DOT; 2], |_, _| INK);
+            self.set(left + x, top + y, INK);
         }
     }
 
     /// Text that ends there.
     fn text_before(&mut self, right: u32, top: u32, text: &str) {
-        let width = DOT * STEP * text.chars().count() as u32;
+        let width = STEP * text.chars().count() as u32;
         self.text(right.saturating_sub(width), top, text);
     }
 
@@ -265,7 +262,7 @@ impl Canvas {
             }
         }
         for (dx, dy) in letter.map_or_else(Vec::new, |letter| letters::dots(&letter.to_string())) {
-            self.block(x + 5 + DOT * dx, y + 4 + DOT * dy, [DOT; 2], |_, _| mark);
+            self.set(x + 5 + dx, y + 4 + dy, mark);
         }
     }
 
@@ -275,13 +272,13 @@ impl Canvas {
         let value = |x: u32, y: u32| values.get((y * width + x) as usize).copied();
         self.block(left, top, MAP, |x, y| value(x, y).map_or(PAPER.map(|c| 0.6 * c), |v| color(v, highest)));
         for (number, z) in ["1", "0", "-1"].into_iter().enumerate() {
-            let y = top + number as u32 * (height - DOT * LINE) / 2;
+            let y = top + number as u32 * (height - LINE) / 2;
             self.text_before(left - 4, y, z);
         }
         self.text_before(left - 4, top + height / 4, "cos");
         for turn in 0..=4 {
             let text = format!("{}°", 90 * turn);
-            let (x, wide) = (left + turn * width / 4, DOT * STEP * text.chars().count() as u32);
+            let (x, wide) = (left + turn * width / 4, STEP * text.chars().count() as u32);
             self.block(x.min(left + width - 1), top + height, [1, 3], |_, _| INK);
             // The first begins at its place, the last ends there.
             self.text(x - turn * wide / 4, top + height + 4, &text);
@@ -300,7 +297,7 @@ impl Canvas {
         });
         for decade in 0..=DECADES as u32 {
             let text = format!("{}", 10f32.powf(highest - DECADES + decade as f32));
-            let wide = DOT * STEP * text.chars().count() as u32;
+            let wide = STEP * text.chars().count() as u32;
             let x = left + decade * width / DECADES as u32;
             self.text(x - decade * wide / DECADES as u32, top + 13, &text);
         }

@@ -14,8 +14,10 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-/// Small cells, so that there are many.
-const GUIDE: &str = "<guide type='sd_tree'><float name='spatial_threshold' value='100'/></guide>";
+/// A guide with small cells, so that there are many.
+const GUIDED: &str = "<guide type='sd_tree'><float name='spatial_threshold' value='100'/></guide>";
+/// Goes by estimates of pixels and by what scattering brings, and splits often.
+const ADJOINT: &str = "<roulette type='adjoint'><float name='window' value='1'/></roulette>";
 
 /// A folder of its own, empty.
 fn folder(name: &str) -> PathBuf {
@@ -36,8 +38,9 @@ fn file(path: &Path, frozen: bool) -> Kept {
     Kept { guide_file: Some(GuideFile { path: path.to_owned(), frozen }), checkpoint: None }
 }
 
-/// Renders a scene and gives the picture's bits.
+/// Renders a scene with `path` and what is nested in it, and gives the picture's bits.
 fn render(
+    nested: &str,
     number: usize,
     spp: u32,
     threads: usize,
@@ -46,7 +49,7 @@ fn render(
 ) -> Result<(Report, Vec<u32>), RenderError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads start");
     pool.install(|| {
-        let scene = scene(SCENES[number].1, &format!("<integrator type='path'>{GUIDE}</integrator>"));
+        let scene = scene(SCENES[number].1, &format!("<integrator type='path'>{nested}</integrator>"));
         let integrator = scene.integrator().expect("there is one");
         let budget = Budget::Samples(spp);
         let mut cx = RenderContext::new(&scene, &scene.sensors()[0], budget, 1, control, integrator.aov_names());
@@ -58,13 +61,13 @@ fn render(
 }
 
 fn whole(spp: u32, threads: usize, kept: Kept) -> Vec<u32> {
-    let (report, bits) = render(1, spp, threads, kept, &Control::new()).expect("it renders");
+    let (report, bits) = render(GUIDED, 1, spp, threads, kept, &Control::new()).expect("it renders");
     assert!(report.spp == spp && bits.iter().any(|bits| f32::from_bits(*bits) > 0.0));
     bits
 }
 
-/// A file is a by-product; runs that begin with it have the same bits for any number of threads; it learns on when it can
-/// learn from more, and never when it is frozen.
+/// A file is a by-product; runs that begin with it have the same bits for any number of threads; it learns on when it
+/// can learn from more, and never when it is frozen.
 #[test]
 fn hc_p08_runs_from_the_same_file_have_the_same_bits() {
     let folder = folder("bits");
@@ -83,17 +86,17 @@ fn hc_p08_runs_from_the_same_file_have_the_same_bits() {
     assert_eq!(whole(100, 1, file(&first, false)), whole(100, 3, file(&second, false)));
     let on = fs::read(&first).expect("a file");
     assert!(on == fs::read(&second).expect("a file") && Learnt::of_bytes(&on).expect("sound").spp >= 2 * begun.spp);
-    assert!(render(1, 8, 2, file(&folder.join("none"), true), &Control::new()).is_err(), "nothing to freeze");
+    assert!(render(GUIDED, 1, 8, 2, file(&folder.join("none"), true), &Control::new()).is_err(), "nothing to freeze");
 }
 
 /// Guides that know where light is give less noise from the first sample on.
 #[test]
 fn a_run_that_begins_with_a_file_has_less_noise() {
     let learnt = folder("noise").join("file");
-    let (_, reference) = render(0, 4096, 2, Kept::default(), &Control::new()).expect("it renders");
-    render(0, 512, 2, file(&learnt, false), &Control::new()).expect("it renders");
+    let (_, reference) = render(GUIDED, 0, 4096, 2, Kept::default(), &Control::new()).expect("it renders");
+    render(GUIDED, 0, 512, 2, file(&learnt, false), &Control::new()).expect("it renders");
     let error = |kept: Kept| {
-        let (_, bits) = render(0, 32, 2, kept, &Control::new()).expect("it renders");
+        let (_, bits) = render(GUIDED, 0, 32, 2, kept, &Control::new()).expect("it renders");
         let pairs = bits.iter().zip(&reference).map(|(a, b)| (f32::from_bits(*a), f32::from_bits(*b)));
         pairs.map(|(a, b)| f64::from((a - b).powi(2) / (b * b + 0.01))).sum::<f64>() / reference.len() as f64
     };
@@ -110,7 +113,7 @@ fn a_file_of_another_scene_or_guide_is_refused() {
     let path = folder("other").join("file");
     whole(16, 2, file(&path, false));
     let told = |number: usize| {
-        let refused = render(number, 16, 2, file(&path, false), &Control::new()).expect_err("refused");
+        let refused = render(GUIDED, number, 16, 2, file(&path, false), &Control::new()).expect_err("refused");
         refused.to_string()
     };
     let other = told(0);
@@ -148,8 +151,8 @@ fn what_is_recalled_learns_on_alike() {
     assert!(recalled.save() == learner.save() && recalled.save() != saved);
 }
 
-/// Any bytes are refused or give a field that is sound, may be sampled and learns on; and nothing as large as they say is
-/// allocated.
+/// Any bytes are refused or give a field that is sound, may be sampled and learns on; and nothing as large as they say
+/// is allocated.
 #[test]
 fn hc_i22_damaged_files_are_refused_or_harmless() {
     const VERSIONS: usize = 4000;
@@ -191,18 +194,18 @@ fn checkpoint(path: &Path, every: f64) -> Checkpoint {
     Checkpoint { path: path.to_owned(), every, of: vec![("seed".to_owned(), "1".to_owned())] }
 }
 
-/// Interrupted between two passes or in the midst of one, in any kind of iteration, once or often: the picture, the
-/// numbers and what was learnt are those of a run without interruption.
-#[test]
-fn hc_x02_an_interrupted_guided_run_has_the_same_bits() {
+/// Each run is interrupted after these numbers of samples per pixel, at the end of a pass, or after as many samples as
+/// is told for a number of pixels, inside of one: the picture, the numbers and what was learnt are those of a run
+/// without interruption.
+fn interruptions_leave_no_trace(test: &str, nested: &str, after: &[&[u32]], inside: &[fn(u64) -> u64]) {
     const SPP: u32 = 64;
-    let folder = folder("interrupted");
+    let folder = folder(test);
     let both = |name: &str, every: f64| Kept {
         guide_file: Some(GuideFile { path: folder.join(format!("{name}.guide")), frozen: false }),
         checkpoint: Some(checkpoint(&folder.join(format!("{name}.state")), every)),
     };
     let alone = Kept { checkpoint: None, ..both("alone", 0.0) };
-    let (expected, bits) = render(1, SPP, 2, alone, &Control::new()).expect("it renders");
+    let (expected, bits) = render(nested, 1, SPP, 2, alone, &Control::new()).expect("it renders");
     let learnt = fs::read(folder.join("alone.guide")).expect("a file");
     let compare = |name: &str, report: &Report, found: &[u32]| {
         assert!(found == bits, "{name}: another picture");
@@ -210,26 +213,26 @@ fn hc_x02_an_interrupted_guided_run_has_the_same_bits() {
         assert_eq!(report.notes, expected.notes, "{name}");
         assert!(fs::read(folder.join(format!("{name}.guide"))).expect("a file") == learnt, "{name}: learnt otherwise");
     };
-    for stops in [vec![3], vec![8], vec![11], vec![19], vec![30], vec![45], vec![2, 9, 10, 23, 40]] {
+    for stops in after {
         let name = format!("{stops:?}");
-        for stop in stops {
+        for &stop in *stops {
             let look = |end: lucerna::core::render::PassEnd<'_>| match end.spp >= stop {
                 true => ControlFlow::Break(()),
                 false => ControlFlow::Continue(()),
             };
             let control = Control::new().with_pass_end(&look);
-            let (report, _) = render(1, SPP, 1, both(&name, 1e9), &control).expect("it renders");
+            let (report, _) = render(nested, 1, SPP, 1, both(&name, 1e9), &control).expect("it renders");
             assert!(report.stopped && report.spp >= stop && report.spp < SPP, "{name}: {}", report.spp);
             fs::remove_file(folder.join(format!("{name}.guide"))).expect("a file was written at the end");
         }
-        let (report, found) = render(1, SPP, 3, both(&name, 1e9), &Control::new()).expect("it goes on");
+        let (report, found) = render(nested, 1, SPP, 3, both(&name, 1e9), &Control::new()).expect("it goes on");
         compare(&name, &report, &found);
         // Over already: the same picture again, without a sample.
-        let (again, found) = render(1, SPP, 3, both(&name, 1e9), &Control::new()).expect("it is over");
+        let (again, found) = render(nested, 1, SPP, 3, both(&name, 1e9), &Control::new()).expect("it is over");
         assert!(found == bits && again.samples == report.samples, "{name}");
     }
     let pixels = expected.samples / u64::from(SPP);
-    for stop in [4 * pixels + pixels / 2, 13 * pixels + 5, 20 * pixels + pixels / 3, 58 * pixels + 7] {
+    for stop in inside.iter().map(|inside| inside(pixels)) {
         let name = format!("after {stop} samples");
         let taken = AtomicU64::new(0);
         let count = |progress: lucerna::core::render::Progress| {
@@ -237,11 +240,35 @@ fn hc_x02_an_interrupted_guided_run_has_the_same_bits() {
         };
         let clock = || Duration::from_secs(u64::from(taken.load(Ordering::Relaxed) >= stop));
         let control = Control::new().with_progress(&count).with_clock(&clock).with_deadline(0.5);
-        let (report, _) = render(1, SPP, 2, both(&name, 0.0), &control).expect("it renders");
+        let (report, _) = render(nested, 1, SPP, 2, both(&name, 0.0), &control).expect("it renders");
         assert!(report.stopped && report.samples > pixels * u64::from(report.spp), "{name}: not inside a pass");
         let _ = fs::remove_file(folder.join(format!("{name}.guide")));
-        let (report, found) = render(1, SPP, 2, both(&name, 0.0), &Control::new()).expect("it goes on");
+        let (report, found) = render(nested, 1, SPP, 2, both(&name, 0.0), &Control::new()).expect("it goes on");
         compare(&name, &report, &found);
+    }
+}
+
+/// In any kind of iteration, once or often.
+#[test]
+fn hc_x02_an_interrupted_guided_run_has_the_same_bits() {
+    let inside: [fn(u64) -> u64; 4] = [
+        |pixels| 4 * pixels + pixels / 2,
+        |pixels| 13 * pixels + 5,
+        |pixels| 20 * pixels + pixels / 3,
+        |pixels| 58 * pixels + 7,
+    ];
+    let after: [&[u32]; 7] = [&[3], &[8], &[11], &[19], &[30], &[45], &[2, 9, 10, 23, 40]];
+    interruptions_leave_no_trace("interrupted", GUIDED, &after, &inside);
+}
+
+/// Roulette that goes by what was found for the pixel and by what scattering has brought finds both again, with a guide
+/// and without one.
+#[test]
+fn hc_x02_an_interrupted_run_with_learnt_roulette_has_the_same_bits() {
+    let both = format!("{GUIDED}{ADJOINT}");
+    for (test, nested) in [("interrupted_adjoint", ADJOINT), ("interrupted_both", &both)] {
+        let inside: [fn(u64) -> u64; 2] = [|pixels| 5 * pixels + pixels / 2, |pixels| 40 * pixels + 7];
+        interruptions_leave_no_trace(test, nested, &[&[3], &[11], &[2, 9, 23, 40]], &inside);
     }
 }
 
@@ -251,9 +278,9 @@ fn hc_i22_other_checkpoints_are_refused() {
     let folder = folder("refused");
     let path = folder.join("state");
     let kept = |of: Checkpoint| Kept { guide_file: None, checkpoint: Some(of) };
-    render(1, 20, 2, kept(checkpoint(&path, 0.0)), &Control::new()).expect("it renders");
+    render(GUIDED, 1, 20, 2, kept(checkpoint(&path, 0.0)), &Control::new()).expect("it renders");
     let told = |of: Checkpoint| {
-        render(1, 20, 2, kept(of), &Control::new()).err().map(|e| e.to_string()).expect("it is refused")
+        render(GUIDED, 1, 20, 2, kept(of), &Control::new()).err().map(|e| e.to_string()).expect("it is refused")
     };
     let mut other = checkpoint(&path, 0.0);
     other.of[0].1 = "2".to_owned();

@@ -1,18 +1,19 @@
-//! Every combination of decisions agrees with `path` in published scenes, which are not part of the repository: a folder
-//! each in the folder that `LUCERNA_SCENES` names. Without it nothing is rendered, and the test says so.
+//! Every combination of decisions agrees with `path` in published scenes, which are not part of the repository: a
+//! folder each in the folder that `LUCERNA_SCENES` names. Without it nothing is rendered, and the test says so.
 
 use crate::support::render;
 use lucerna::compare::method::{Method, Methods};
 use lucerna::core::image::Image;
 use lucerna::core::render::SampleOrder;
-use lucerna::core::scene::{ObjectKind, Parameter, Scene, Value, instantiate, xml};
+use lucerna::core::scene::{Scene, instantiate, xml};
 use lucerna::core::stats::Measured;
 use lucerna::core::stats::chi2::sidak;
 use lucerna::core::stats::figures::measured;
 use lucerna::core::stats::images::{Scale, compare};
 use std::path::{Path, PathBuf};
 
-/// Of a small lamp in view, a pixel sees much or nothing: ten pictures of few samples would say little about their mean.
+/// Of a small lamp in view, a pixel sees much or nothing: ten pictures of few samples would say little about their
+/// mean.
 const PATH: &str = "path:hide_emitters=true";
 /// Pixels of a picture.
 const SIZE: [u32; 2] = [48, 32];
@@ -49,13 +50,7 @@ fn scenes(folder: &Path) -> Vec<PathBuf> {
 /// A scene at the test's size with a method; `None` if it does not load.
 fn load(path: &Path, method: Option<&Method>) -> Option<Scene> {
     let mut description = xml::load_upgraded(path, &xml::LoadOptions::default()).ok()?;
-    for film in description.nodes.iter_mut().filter(|node| node.kind == ObjectKind::Film) {
-        for (name, value) in [("width", SIZE[0]), ("height", SIZE[1])] {
-            film.take(name);
-            let (name, at) = (name.to_owned(), film.at.clone());
-            film.parameters.push(Parameter { name, value: Value::Integer(value.into()), at });
-        }
-    }
+    description.resize_films(SIZE, "test");
     let registry = lucerna::builtin();
     let path_itself = Method::of_text(PATH).ok()?;
     method.unwrap_or(&path_itself).apply(&mut description, &registry).ok()?;

@@ -1,5 +1,6 @@
 //! Drives chromium by its DevTools protocol over two pipes: pages, keys, the mouse, screenshots, and what the console said.
 
+use crate::support::program::chromium;
 use serde_json::{Value, json};
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Write};
@@ -23,9 +24,7 @@ pub struct Browser {
 impl Browser {
     /// `None` if there is no chromium.
     pub fn start(folder: &Path) -> Option<Self> {
-        let program = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"]
-            .into_iter()
-            .find(|p| Path::new(p).exists())?;
+        let program = chromium()?;
         let pipes = ["to", "from"].map(|name| folder.join(name));
         let made = Command::new("mkfifo").args(&pipes).status().expect("mkfifo");
         assert!(made.success());

@@ -2,6 +2,8 @@
 
 mod browser;
 mod page;
+#[path = "../support/mod.rs"]
+mod support;
 mod target;
 mod viewer;
 

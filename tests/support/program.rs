@@ -27,6 +27,13 @@ pub fn folder_of(file: &str, test: &str) -> PathBuf {
     Path::new(env!("CARGO_TARGET_TMPDIR")).join(file).join(test)
 }
 
+/// The program of a browser of the family of chromium, if there is one.
+pub fn chromium() -> Option<&'static str> {
+    ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"]
+        .into_iter()
+        .find(|program| Path::new(program).exists())
+}
+
 /// A temporary path as an argument.
 pub fn text(path: &Path) -> &str {
     path.to_str().expect("temporary names are UTF-8")

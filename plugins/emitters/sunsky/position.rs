@@ -66,8 +66,8 @@ impl PlaceAndTime {
     /// Days since noon of 1 January 2000, universal time.
     ///
     /// The day number is that of Fliegel and Van Flandern 1968. The reference renderer keeps it in single precision,
-    /// which near day 2 451 545 knows quarters of a day only; the sun is some hundredths of a degree off for that, here as there, so
-    /// that shadows fall on the same pixels.
+    /// which near day 2 451 545 knows quarters of a day only; the sun is some hundredths of a degree off for that, here
+    /// as there, so that shadows fall on the same pixels.
     fn days_since_2000(&self, hours: f64) -> f64 {
         let shift = (self.month - 14) / 12;
         let day_number = 1461 * (self.year + 4800 + shift) / 4 + 367 * (self.month - 2 - 12 * shift) / 12

@@ -38,7 +38,7 @@ impl GuideField for Field {
         // The integral of the factor over all directions.
         let (cosines, reach) =
             if self.cosine && one_sided { (cosines(normal), PI * f32::from(UPRIGHT)) } else { (&[1; CELLS], 4.0 * PI) };
-        Some(arena.alloc(Here { reach, ..Here::new(tree, leaf.p_guide, cosines)? }))
+        Some(arena.alloc(Here::new(tree, leaf.p_guide, cosines, reach)?))
     }
 
     fn incident(&self, p: Vec3, d: Vec3) -> Option<f32> {
@@ -87,7 +87,7 @@ struct Here<'g> {
 impl<'g> Here<'g> {
     /// `None` if no light comes from where it would be scattered.
     #[inline]
-    fn new(tree: &'g Quadtree, p_guide: f32, cosines: &'g [u8; CELLS]) -> Option<Self> {
+    fn new(tree: &'g Quadtree, p_guide: f32, cosines: &'g [u8; CELLS], reach: f32) -> Option<Self> {
         let mut columns = [0.0; EDGE];
         let rows = tree.grid.as_chunks::<EDGE>().0.iter().zip(cosines.as_chunks::<EDGE>().0);
         rows.for_each(|(grid, cosines)| {
@@ -97,15 +97,7 @@ impl<'g> Here<'g> {
         });
         let total = sum(&columns);
         let scale = UNIFORM * CELLS as f32 / total;
-        (total > 0.0 && scale.is_finite()).then_some(Here {
-            tree,
-            cosines,
-            p_guide,
-            columns,
-            total,
-            scale,
-            reach: 4.0 * PI,
-        })
+        (total > 0.0 && scale.is_finite()).then_some(Here { tree, cosines, p_guide, columns, total, scale, reach })
     }
 }
 

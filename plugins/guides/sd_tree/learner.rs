@@ -184,18 +184,16 @@ impl Learner {
             kept: self.settings.memory,
         };
         let old: Vec<Sums> = self.cells.iter_mut().map(|cell| std::mem::take(&mut cell.sums)).collect();
-        for _ in 0..MOST_COARSENINGS {
+        let fits = (0..MOST_COARSENINGS).any(|_| {
             self.cells.par_iter_mut().zip(&old).for_each(|(cell, old)| {
                 let kept = how.kept * (-f64::from(cell.halved)).exp2();
                 cell.sums = old.refined(Refinement { kept, ..how });
             });
-            if self.bytes() <= self.settings.max_bytes {
-                break;
-            }
-            self.full = true;
+            let fits = self.bytes() <= self.settings.max_bytes;
+            self.full |= !fits;
             how.threshold *= 2.0;
-        }
-        let fits = self.bytes() <= self.settings.max_bytes;
+            fits
+        });
         for cell in &mut self.cells {
             cell.halved = 0;
             if !fits {

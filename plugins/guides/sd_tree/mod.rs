@@ -1,10 +1,10 @@
 //! `sd_tree`: learns where light comes from in a tree over space whose leaves hold trees over directions.
 //!
 //! Practical path guiding (Müller, Gross, Novák 2017) with the extensions of Müller 2019 ("Practical Path Guiding in
-//! Production"). Space is halved along x, y, z in turn; each cell holds a quadtree over the cylinder (z, azimuth) of world
-//! directions. Paths note at each vertex the radiance that arrived; after an iteration cells with many records are
-//! halved and quadtrees are refined where the flux is. A direction is drawn from the mixture of this and the BSDF; the
-//! probability of either is learnt in each cell. Delta lobes are left to the BSDF. Incident radiance only: where
+//! Production"). Space is halved along x, y, z in turn; each cell holds a quadtree over the cylinder (z, azimuth) of
+//! world directions. Paths note at each vertex the radiance that arrived; after an iteration cells with many records
+//! are halved and quadtrees are refined where the flux is. A direction is drawn from the mixture of this and the BSDF;
+//! the probability of either is learnt in each cell. Delta lobes are left to the BSDF. Incident radiance only: where
 //! the BSDF is narrow and light comes from everywhere, it helps little. The picture is unbiased whatever was learnt.
 //!
 //! | parameter | type | default | meaning |
@@ -27,15 +27,17 @@
 //! | `combination` | string | inverse_variance | which iterations make the picture: the last four by `inverse_variance`, or the `last` |
 //! | `max_memory` | float | 64 | MiB that the trees may take; then they stay coarser |
 //!
-//! Where light is found rarely but from few directions, as that of a small lamp through glass, `prior` hides what was found:
-//! 0 is better there by far.
+//! Where light is found rarely but from few directions, as that of a small lamp through glass, `prior` hides what was
+//! found: 0 may be better there. `lucerna compare scene.xml -m path path+guide=sd_tree path+guide=sd_tree:prior=0` tells
+//! that, and what each sample costs.
 //!
 //! Limits. A cell of space has one distribution for all its points: a bright spot near by is blurred by parallax until
 //! the cells are small, which takes millions of samples. Small or short renders, and those whose noise comes from
-//! sampled lights or from caustics that are rarely found, gain little, and each sample costs a tenth (in large scenes) to
-//! twice as much (in a box of twelve triangles). Each candidate of `resampling` costs nearly as much again as the guide
-//! does; it pays where rays are dear and BSDFs are not diffuse. `prior` 0, `memory` 0, `spatial_threshold` 12000, both filters
-//! `nearest`, `p_guide` 0.5, `product` `none`, `startup` 0 and `combination` `last` are nearly the form of 2017.
+//! sampled lights or from caustics that are rarely found, gain little, and each sample costs more: least where rays are
+//! dear, as in large scenes, and most in a box of few triangles. Each candidate of `resampling` asks the guide and the
+//! BSDF again; it pays where rays are dear and BSDFs are not diffuse. `prior` 0, `memory` 0, `spatial_threshold` 12000,
+//! both filters `nearest`, `p_guide` 0.5, `product` `none`, `startup` 0 and `combination` `last` are nearly the form of
+//! 2017.
 //!
 //! Roulette begins at the integrator's `rr_depth`. Where light arrives after many bounces it ends paths that matter:
 //! `<roulette type="adjoint"/>` beside the guide goes by what this tree has learnt, or a larger `rr_depth` may pay.

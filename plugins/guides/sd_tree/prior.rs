@@ -25,11 +25,11 @@ pub fn grids<'a>(tree: &SpatialTree, leaf: impl Fn(usize) -> &'a Sums, prior: f6
         });
         sums[index] = std::array::from_fn(|cell| a[cell].and(b[cell]));
     }
-    let mut expected = vec![[1.0 / CELLS as f64; CELLS]; inner.len()];
+    let everywhere = [1.0 / CELLS as f64; CELLS];
+    let mut expected = vec![everywhere; inner.len()];
     let mut grids = vec![[0.0; CELLS]; tree.leaves()];
-    let single = [1.0 / CELLS as f64; CELLS];
     if inner.is_empty() {
-        grids[0] = blended(&leaf(0).cells(), &single, prior).map(|part| part as f32);
+        grids[0] = blended(&leaf(0).cells(), &everywhere, prior).map(|part| part as f32);
     }
     for (index, children) in inner.iter().enumerate() {
         let here = blended(&sums[index], &expected[index], prior);

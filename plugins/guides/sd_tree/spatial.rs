@@ -29,8 +29,8 @@ pub struct SpatialTree {
     root: u32,
     nodes: Vec<[u32; 2]>,
     leaves: u32,
-    /// Where the search goes on for each cell of a grid of 8 × 8 × 8, and how many splits are above: nine, or as many as
-    /// the leaf has.
+    /// Where the search goes on for each cell of a grid of 8 × 8 × 8, and how many splits are above: nine, or as many
+    /// as the leaf has.
     top: Vec<(u32, u32)>,
 }
 
@@ -115,33 +115,28 @@ impl SpatialTree {
         let [x, y, z] = cell.map(|x| (x >> (BITS - TOP_BITS)) as usize);
         let (node, depth) = self.top[(((z << TOP_BITS) + y) << TOP_BITS) + x];
         // Where the table ends in the tree, nine splits are above, three of each coordinate.
-        self.search(node, depth, cell.map(|x| x << (32 - BITS + TOP_BITS)))
+        let (leaf, depth) = self.search(node, depth, None, cell.map(|x| x << (32 - BITS + TOP_BITS)));
+        (leaf & !LEAF, depth)
     }
 
-    /// The leaf at or below a node with so many splits above. The bits of coordinates that decide are the highest, and
-    /// the next decision is that of the first coordinate.
-    #[inline]
-    fn search(&self, mut node: u32, mut depth: u32, [mut a, mut b, mut c]: Cell) -> (u32, u32) {
-        while node & LEAF == 0 {
+    /// The leaf at or below a node with so many splits above, or the node where that many `most` are reached. The bits
+    /// of coordinates that decide are the highest, and the next decision is that of the first coordinate.
+    #[inline(always)]
+    fn search(&self, mut node: u32, mut depth: u32, most: Option<u32>, [mut a, mut b, mut c]: Cell) -> (u32, u32) {
+        while node & LEAF == 0 && most.is_none_or(|most| depth < most) {
             node = self.nodes[node as usize][(a >> 31) as usize];
             (a, b, c) = (b, c, a << 1);
             depth += 1;
         }
-        (node & !LEAF, depth)
+        (node, depth)
     }
 
     /// Fills the table by which searches begin.
     fn look_up(&mut self) {
         for index in 0..1 << TOP {
             let coordinate = |axis: u32| (index >> (axis * TOP_BITS)) as u32 & ((1 << TOP_BITS) - 1);
-            let [mut a, mut b, mut c] = [0, 1, 2].map(|axis| coordinate(axis) << (32 - TOP_BITS));
-            let (mut node, mut depth) = (self.root, 0);
-            while node & LEAF == 0 && depth < TOP {
-                node = self.nodes[node as usize][(a >> 31) as usize];
-                (a, b, c) = (b, c, a << 1);
-                depth += 1;
-            }
-            self.top[index] = (node, depth);
+            let cell = [0, 1, 2].map(|axis| coordinate(axis) << (32 - TOP_BITS));
+            self.top[index] = self.search(self.root, 0, Some(TOP), cell);
         }
     }
 

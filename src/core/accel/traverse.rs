@@ -7,21 +7,23 @@
 //!
 //! # Why no box is missed
 //!
-//! With u = 2⁻²⁴, planes p and origin o relative to the middle of the scene, and S = max |p| + |o|: moving o there is wrong
-//! by u S; the plane's distance (p − o) / d, computed as p · (1/d) − o · (1/d), is off by what moving p by 4 u S would do; and
-//! the triangle test accepts points up to 6 u S beside a triangle, since it rounds the sheared vertices. The rounding of t
-//! adds u S. Each plane is therefore moved outwards by 12 u S, in the constant o · (1/d), at no cost. A direction component
-//! below 10⁻¹⁸ of the largest counts as that; over the length of the scene this shifts the ray by much less than u S.
+//! With u = 2⁻²⁴, planes p and origin o relative to the middle of the scene, and S = max |p| + |o|: moving o there is
+//! wrong by u S; the plane's distance (p − o) / d, computed as p · (1/d) − o · (1/d), is off by what moving p by 4 u S
+//! would do; and the triangle test accepts points up to 6 u S beside a triangle, since it rounds the sheared vertices.
+//! The rounding of t adds u S. Each plane is therefore moved outwards by 12 u S, in the constant o · (1/d), at no cost.
+//! A direction component below 10⁻¹⁸ of the largest counts as that; over the length of the scene this shifts the ray by
+//! much less than u S.
 
 //!
 //! # Why no triangle is missed
 //!
-//! Heights count along the axis of the shear. With R the largest sheared coordinate of a triangle and M the largest of its
-//! heights plus R, which bounds its coordinates relative to the ray's origin as the slopes are at most 1, sheared coordinates are within 6 u M of exact, edge functions within 36 u M R, their
-//! sum (`area`) within 150 u M R, and their sum times heights (`moment`) within 170 u M² R; moment over area is the height
-//! of the hit. [`ROUNDING`] allows for 256 u: what is left over is more than the rounding of the limits and of `t`, as
-//! area ≤ 6 R² and R ≤ 2 M. [`TINY`] covers numbers so small that they are not rounded relatively. Lanes that may still
-//! be hit go to [`Shear::intersect`]; only whether there is *any* hit can be told without it, from the same bounds.
+//! Heights count along the axis of the shear. With R the largest sheared coordinate of a triangle and M the largest of
+//! its heights plus R, which bounds its coordinates relative to the ray's origin as the slopes are at most 1, sheared
+//! coordinates are within 6 u M of exact, edge functions within 36 u M R, their sum (`area`) within 150 u M R, and
+//! their sum times heights (`moment`) within 170 u M² R; moment over area is the height of the hit. [`ROUNDING`] allows
+//! for 256 u: what is left over is more than the rounding of the limits and of `t`, as area ≤ 6 R² and R ≤ 2 M.
+//! [`TINY`] covers numbers so small that they are not rounded relatively. Lanes that may still be hit go to
+//! [`Shear::intersect`]; only whether there is *any* hit can be told without it, from the same bounds.
 
 use super::Primitive;
 use super::ray::Ray;
@@ -424,7 +426,8 @@ mod avx2 {
 
 /// Nodes that wait: entry distance in the upper half, word in the lower, so that comparing integers compares distances.
 ///
-/// Each of at most [`MAX_DEPTH`](super::builders::MAX_DEPTH) levels leaves at most seven behind; the deepest adds eight.
+/// Each of at most [`MAX_DEPTH`](super::builders::MAX_DEPTH) levels leaves at most seven behind; the deepest adds
+/// eight.
 struct Stack {
     entries: [MaybeUninit<u64>; Self::SIZE],
     len: usize,

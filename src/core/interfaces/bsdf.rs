@@ -64,6 +64,12 @@ impl Lobes {
         self.intersects(Lobes::SMOOTH)
     }
 
+    /// No lobe with a density crosses the surface: emitters and guides need to know of one side only.
+    #[inline]
+    pub const fn is_one_sided(self) -> bool {
+        !self.intersects(Lobes::SMOOTH.and(Lobes::TRANSMISSION))
+    }
+
     /// Has a lobe without a density.
     #[inline]
     pub const fn has_delta(self) -> bool {

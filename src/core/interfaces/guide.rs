@@ -1,14 +1,14 @@
 //! Which direction a path takes: learnt from earlier samples.
 //!
-//! A [`Guide`] is the plugin, with its settings. It makes a [`GuideLearner`], which takes in what the paths of a run have
-//! noted, tile after tile, and makes a [`GuideField`] of it after each iteration. A field never changes; so it has the
-//! same bits for any number of threads. At a vertex it gives [`GuidedDirections`], which are read once and then used
-//! for sampling, for densities, and for the weights of emitter sampling alike: otherwise pictures would be biased.
+//! A [`Guide`] is the plugin, with its settings. It makes a [`GuideLearner`], which takes in what the paths of a run
+//! have noted, tile after tile, and makes a [`GuideField`] of it after each iteration. A field never changes; so it has
+//! the same bits for any number of threads. At a vertex it gives [`GuidedDirections`], which are read once and then
+//! used for sampling, for densities, and for the weights of emitter sampling alike: otherwise pictures would be biased.
 //!
 //! A guide never stands alone. Directions come from the mixture of the guide and the BSDF, and the probability of the
 //! guide is at most [`MOST_GUIDED`], so that whatever a field has learnt, right or wrong, no light is lost.
 
-use super::{Arena, Outlook, SurfaceHit};
+use super::{Arena, Bxdf, Lobes, Outlook, SurfaceHit};
 use crate::io::{IoError, Result};
 use crate::math::{Aabb, Vec2, Vec3};
 use std::sync::Arc;
@@ -54,7 +54,8 @@ pub struct Training {
     pub learn_direct: bool,
     /// Narrower lobes than this are not guided.
     pub least_roughness: f32,
-    /// Directions that are tried at a vertex before one of them is chosen by the product of the BSDF and the light learnt.
+    /// Directions that are tried at a vertex before one of them is chosen by the product of the BSDF and the light
+    /// learnt.
     pub candidates: u32,
 }
 
@@ -182,11 +183,18 @@ pub trait GuidedDirections {
     /// Density of a world direction per solid angle: that of [`sample`](Self::sample).
     fn pdf(&self, d: Vec3) -> f32;
 
-    /// Light that arrives from a world direction, as a multiple of the mean over all that a diffuse surface would scatter,
-    /// roughly.
+    /// Light that arrives from a world direction, as a multiple of the mean over all that a diffuse surface would
+    /// scatter, roughly.
     fn light(&self, d: Vec3) -> f32 {
         4.0 * std::f32::consts::PI * self.pdf(d)
     }
+}
+
+/// Whether directions at a BSDF with these lobes are guided: it scatters into more than single directions, and no lobe
+/// is narrower than [`Training::least_roughness`].
+#[inline]
+pub fn is_guided(bxdf: &dyn Bxdf, lobes: Lobes, least_roughness: f32) -> bool {
+    lobes.is_smooth() && bxdf.roughness() >= least_roughness
 }
 
 /// What a path has found out at one vertex.

@@ -1,9 +1,9 @@
 //! Whether a path goes on, stops, or splits.
 //!
 //! A [`Roulette`] is asked twice at a vertex: before light is sampled and directions are drawn there
-//! ([`branches`](Roulette::branches)), and when a direction is chosen ([`survival`](Roulette::survival)). It answers with
-//! the number of continuations that is to be expected; each carries the throughput divided by that number, so pictures
-//! are unbiased for any answer above zero that comes from what was known before the sample.
+//! ([`branches`](Roulette::branches)), and when a direction is chosen ([`survival`](Roulette::survival)). It answers
+//! with the number of continuations that is to be expected; each carries the throughput divided by that number, so
+//! pictures are unbiased for any answer above zero that comes from what was known before the sample.
 
 use super::Guide;
 use crate::color::Rgb;
@@ -41,15 +41,16 @@ pub struct Goal {
     pub effort: f32,
 }
 
-/// What scattering at a surface has brought so far: once light is sampled, a direction is drawn, and its path is followed
-/// to the end. Luminances relative to that of the albedo.
+/// What scattering at a surface has brought so far: once light is sampled, a direction is drawn, and its path is
+/// followed to the end. Luminances relative to that of the albedo.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Outlook {
     /// Mean of the light scattered.
     pub light: f32,
     /// Mean of its square.
     pub square: f32,
-    /// Mean variance of what is scattered at the same vertex: what splitting lowers. Not more than that among all vertices.
+    /// Mean variance of what is scattered at the same vertex: what splitting lowers. Not more than that among all
+    /// vertices.
     pub spread: f32,
     /// Mean cost in rays.
     pub cost: f32,
@@ -62,9 +63,9 @@ pub trait Roulette: Send + Sync {
         None
     }
 
-    /// How many continuations a vertex is worth, to be expected. Asked only if there is a [`teacher`](Self::teacher). `albedo` is that of the vertex. The answer is brought
-    /// into [[`LEAST_SURVIVAL`], [`MOST_BRANCHES`]]; what is not a number counts as 1. Not asked at the first vertex, nor
-    /// where light is scattered by delta lobes alone.
+    /// How many continuations a vertex is worth, to be expected. Asked only if there is a [`teacher`](Self::teacher).
+    /// `albedo` is that of the vertex. The answer is brought into [[`LEAST_SURVIVAL`], [`MOST_BRANCHES`]]; what is not
+    /// a number counts as 1. Not asked at the first vertex, nor where light is scattered by delta lobes alone.
     fn branches(&self, _path: &PathState, _albedo: Rgb, _outlook: Option<Outlook>) -> f32 {
         1.0
     }
@@ -74,7 +75,8 @@ pub trait Roulette: Send + Sync {
     fn survival(&self, path: &PathState, delta: bool) -> f32;
 }
 
-/// An answer of [`Roulette::branches`] as it is followed: what is not a number counts as 1, and no path is lost for good.
+/// An answer of [`Roulette::branches`] as it is followed: what is not a number counts as 1, and no path is lost for
+/// good.
 #[inline]
 pub fn continuations(answer: f32) -> f32 {
     if answer.is_nan() { 1.0 } else { answer.clamp(LEAST_SURVIVAL, MOST_BRANCHES) }

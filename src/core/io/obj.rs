@@ -9,7 +9,8 @@
 //!
 //! Why a scanner of our own rather than the `tobj` crate, which remains the oracle in the tests: its errors have no
 //! position, it splits files by groups and materials, with corners that lack a texture coordinate the remaining ones
-//! shift against their vertices, index 0 counts as "absent", a file in which only some vertices have colours fails, and it takes several times as long.
+//! shift against their vertices, index 0 counts as "absent", a file in which only some vertices have colours fails, and
+//! it takes several times as long.
 
 use std::collections::HashMap;
 

@@ -4,10 +4,10 @@
 //! they find; what a field gives does not change meanwhile. So every picture is unbiased, and has the same bits for any
 //! number of threads. First come some iterations of one sample per pixel, by which the field learns where paths go at
 //! all; then each has as many as all before it together. The last one takes all that is left of the budget, if that is
-//! less than twice as much (or learning more no longer pays: [`Ending`]), and notes nothing, unless what is learnt is kept
-//! (after Müller, Gross, Novák 2017, section 5, and Müller 2019, sections
-//! 10.2 and 10.7, where iterations begin to double at one sample again, and the last one is as long as two: half of
-//! the picture then is guided by an eighth of the samples). How the pictures become one: [`super::combine`].
+//! less than twice as much (or learning more no longer pays: [`Ending`]), and notes nothing, unless what is learnt is
+//! kept (after Müller, Gross, Novák 2017, section 5, and Müller 2019, sections 10.2 and 10.7, where iterations begin to
+//! double at one sample again, and the last one is as long as two: half of the picture then is guided by an eighth of
+//! the samples). How the pictures become one: [`super::combine`].
 
 use super::checkpoint::Keeper;
 use super::combine::Moments;
@@ -217,8 +217,8 @@ impl Lesson<'_, '_> {
         Some((seconds / pace) as u32)
     }
 
-    /// Where a pass ends that begins now. One that the deadline cuts short is lost: towards the end, passes take half of
-    /// the time that is left, so that no more than a sample per pixel is.
+    /// Where a pass ends that begins now. One that the deadline cuts short is lost: towards the end, passes take half
+    /// of the time that is left, so that no more than a sample per pixel is.
     fn pass_end(&self, part: Part) -> u32 {
         let start = self.at.report.spp;
         let most = self.samples_in_time(self.pace).map_or(LONGEST_PASS, |samples| (samples / 2).max(1));
@@ -286,8 +286,8 @@ impl Lesson<'_, '_> {
         let guidance =
             Guidance { field: &*field, sample_emitters, learning, subjects, goal, least_roughness, candidates };
         let guided = Guided { estimator: self.estimator, guidance, learn_direct, estimates: &self.at.estimates };
-        // Notes are taken in as they come, so that those of a few tiles at most are held. A pass that is lost afterwards
-        // has taught something nevertheless.
+        // Notes are taken in as they come, so that those of a few tiles at most are held. A pass that is lost
+        // afterwards has taught something nevertheless.
         let batch = (NOTED / (end - start) as usize).max(1);
         let hand_over = |notes: Vec<TileNotes>| {
             let (records, found): (Vec<_>, Vec<_>) =

@@ -1,14 +1,14 @@
 //! The error that is left in a picture, estimated while it is rendered and without knowing the true one.
 //!
 //! Let x_n be the mean of the first n samples of a pixel and V(n) its variance. The samples of a run can change places
-//! (with `independent` always; with points in a random order or scrambled digits, the two halves of 2ⁿ points at least), so
-//! the covariance of x_n and x_2n is V(2n), and
+//! (with `independent` always; with points in a random order or scrambled digits, the two halves of 2ⁿ points at
+//! least), so the covariance of x_n and x_2n is V(2n), and
 //!
 //! > E (x_n − x_2n)² = V(n) − V(2n).    (1)
 //!
 //! It is a quarter of the squared difference of the halves, n samples each, whether these are independent or not. For
-//! independent ones it *is* V(2n). Low-discrepancy points spoil that: where one half is too bright, the other one
-//! makes up for it, the halves differ by more than the error of their mean, and (1) taken as V(2n) is too much. But the sum
+//! independent ones it *is* V(2n). Low-discrepancy points spoil that: where one half is too bright, the other one makes
+//! up for it, the halves differ by more than the error of their mean, and (1) taken as V(2n) is too much. But the sum
 //! of (1) over all doublings to come is V(2n) for every kind of points, for it telescopes and the variance goes to
 //! zero. If V falls as n^−α, the sum is a geometric series:
 //!
@@ -18,10 +18,11 @@
 //! same 2^−α. It is kept in [1, 2]: below 1 are only runs that have found something new, a firefly say, and above 2
 //! nothing that paths do.
 //!
-//! The sums go over pixels and channels, each value divided by r² + ε as in relMSE ([`super::metrics`]). For r, which is not
-//! known, stands the mean so far, but no more than that of the four brightest of the eight neighbours: without that, a
-//! firefly divides its own error. All eight would call small lights fireflies, the brightest alone believes too much. What stays out is light that no path has found yet. How far the estimate goes is measured by
-//! `tests/live.rs` and told in the README.
+//! The sums go over pixels and channels, each value divided by r² + ε as in relMSE ([`super::metrics`]). For r, which
+//! is not known, stands the mean so far, but no more than that of the four brightest of the eight neighbours: without
+//! that, a firefly divides its own error. All eight would call small lights fireflies, the brightest alone believes too
+//! much. What stays out is light that no path has found yet. How far the estimate goes is measured by `tests/live.rs`
+//! and told in the README.
 //!
 //! Between doublings, n is the sum of powers of two, and the samples one after the other are blocks of so many. As if
 //! blocks had nothing to do with each other, V(n) = Σ (b/n)² V(b) over the blocks b; with α = 1 that is V(p) p / n.
@@ -76,8 +77,8 @@ impl Doublings {
         self.last.as_ref().is_none_or(|(last, _)| spp >= last.saturating_mul(2) || spp < *last)
     }
 
-    /// Takes the picture of so many samples per pixel: red, green and blue, row by row, of `width` pixels each. If there
-    /// are fewer samples or another number of values than before, a new run has started.
+    /// Takes the picture of so many samples per pixel: red, green and blue, row by row, of `width` pixels each. If
+    /// there are fewer samples or another number of values than before, a new run has started.
     pub fn add(&mut self, spp: u32, picture: Vec<f32>, width: usize) {
         if let Some((last, before)) = &self.last {
             if spp > *last && before.len() == picture.len() {
@@ -164,7 +165,8 @@ mod tests {
 
     const WIDTH: usize = 64;
 
-    /// Feeds pictures of 64 x 64 pixels of the value 1 whose noise has a given standard deviation after so many samples.
+    /// Feeds pictures of 64 x 64 pixels of the value 1 whose noise has a given standard deviation after so many
+    /// samples.
     fn watch(independent: bool, samples: &[u32], noise: impl Fn(&mut Pcg32, u32) -> Vec<f32>) -> Doublings {
         let mut pcg = Pcg32::new(3, 4);
         let mut sums = vec![0.0_f32; WIDTH * WIDTH * CHANNELS];
@@ -203,11 +205,12 @@ mod tests {
         assert!((ratio - 1.0).abs() < 0.06, "{ratio}");
     }
 
-    /// Every second sample makes up for half of the one before, every fourth for half of the pair before, and so on, as points
-    /// of low discrepancy do: the variance is known, and falls faster than 1/n.
+    /// Every second sample makes up for half of the one before, every fourth for half of the pair before, and so on, as
+    /// points of low discrepancy do: the variance is known, and falls faster than 1/n.
     #[test]
     fn samples_that_make_up_for_each_other() {
-        // Sample n is Σ over its bits k of ±g_k, the sign being the bit, fresh numbers for every block of 2^(k+1) samples.
+        // Sample n is Σ over its bits k of ±g_k, the sign being the bit, fresh numbers for every block of 2^(k+1)
+        // samples.
         let levels = std::cell::RefCell::new(vec![Vec::new(); 8]);
         let strength = |k: usize| 0.5_f32.powi(k as i32);
         let noise = |pcg: &mut Pcg32, n: u32| {
