@@ -10,8 +10,8 @@ pub(super) trait Directions {
     /// What is known at a vertex: read once, then used for all that happens there.
     type Here: Copy;
 
-    /// Reads it. `smooth` says whether the BSDF has a lobe with a density here.
-    fn here(&self, hit: &SurfaceHit, bxdf: &dyn Bxdf) -> Self::Here;
+    /// Reads it. `primary` says whether this is the first vertex of a path from the camera.
+    fn here(&self, hit: &SurfaceHit, bxdf: &dyn Bxdf, primary: bool) -> Self::Here;
 
     /// Whether lights are sampled that a ray can also run into.
     fn samples_emitters(&self) -> bool;
@@ -96,7 +96,7 @@ impl Directions for Unguided {
     type Here = ();
 
     #[inline(always)]
-    fn here(&self, _hit: &SurfaceHit, _bxdf: &dyn Bxdf) {}
+    fn here(&self, _hit: &SurfaceHit, _bxdf: &dyn Bxdf, _primary: bool) {}
 
     #[inline(always)]
     fn samples_emitters(&self) -> bool {

@@ -7,7 +7,7 @@
 
 use super::letters::{self, LINE, STEP};
 use lucerna_core::image::{Image, srgb_to_linear};
-use lucerna_core::interfaces::{Arena, GuideField, Lobes, MOST_GUIDED, Sensor, SurfaceHit, Transport};
+use lucerna_core::interfaces::{Arena, GuideField, GuidedVertex, Lobes, MOST_GUIDED, Sensor, SurfaceHit, Transport};
 use lucerna_core::math::{UVec2, Vec2, Vec3};
 use lucerna_core::scene::Scene;
 use std::f32::consts::{PI, TAU};
@@ -104,7 +104,7 @@ impl Learned<'_> {
         let lobes = bxdf.lobes();
         let one_sided = !lobes.and(Lobes::SMOOTH).intersects(Lobes::TRANSMISSION);
         let guided = lobes.is_smooth() && bxdf.roughness() >= self.least_roughness;
-        let guide = self.field.at(&hit, one_sided, &arena);
+        let guide = self.field.at(&hit, GuidedVertex { one_sided, primary: true }, &arena);
         let p_guide = guide.filter(|_| guided).map_or(0.0, |guide| guide.p_guide().clamp(0.0, MOST_GUIDED));
         let of_bsdf = |d: Vec3| bxdf.eval_pdf(hit.wi, hit.to_local(d), Transport::Radiance).1;
         if let Some(guide) = guide {
