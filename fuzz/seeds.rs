@@ -252,7 +252,8 @@ fn dictionary() {
     fs::write(Path::new(env!("CARGO_MANIFEST_DIR")).join("xml.dict"), lines).expect("a file");
 }
 
-/// What a guide has learnt: the content of files, without head and checksum. Of nothing, of one cell, of several.
+/// What a guide has learnt: the content of files, without head and checksum. Of nothing, of one cell, of several, of cells with
+/// two sets.
 fn guides() {
     use lucerna::core::interfaces::{GuideRecord, RecordKind};
     use lucerna::core::math::{Aabb, Vec3};
@@ -260,18 +261,37 @@ fn guides() {
     use lucerna::core::scene::xml::{LoadOptions, load_str};
     use lucerna::core::scene::{Object, build_one};
     let settings = "<float name='spatial_threshold' value='40'/><integer name='directional_depth' value='4'/>";
-    let text = format!("<guide version='3.0.0' type='sd_tree'>{settings}</guide>");
-    let description = load_str(&text, "guide.xml", &LoadOptions::default()).expect("a guide");
-    let Ok(Object::Guide(guide)) = build_one(&lucerna::builtin(), &description) else { panic!("a guide") };
     let bounds = Aabb { min: Vec3::ZERO, max: Vec3::ONE };
-    for (name, records) in [("nothing.guide", 0), ("one.guide", 30), ("cells.guide", 200)] {
+    for (name, records, sets) in [
+        ("nothing.guide", 0, "one"),
+        ("one.guide", 30, "one"),
+        ("cells.guide", 200, "one"),
+        ("direct.guide", 90, "direct_indirect"),
+        ("product.guide", 90, "primary_product"),
+    ] {
+        let more = format!("<string name='sets' value='{sets}'/>");
+        let text = format!("<guide version='3.0.0' type='sd_tree'>{settings}{more}</guide>");
+        let description = load_str(&text, "guide.xml", &LoadOptions::default()).expect("a guide");
+        let Ok(Object::Guide(guide)) = build_one(&lucerna::builtin(), &description) else { panic!("a guide") };
         let mut learner = guide.start(bounds);
         let record = |i: u32| {
             let u = |k: u32| (i.wrapping_mul(k) % 1009) as f32 / 1009.0;
             let d = Vec3::new(u(7) - 0.5, u(11) - 0.5, 0.6).normalize();
             let (radiance, kind) = (1.0 + u(5), RecordKind::Mixed);
             let p = Vec3::new(u(601), u(353), u(197));
-            GuideRecord { p, d, radiance, scattered: radiance, pdf: 0.5, pdf_bsdf: 0.3, pdf_guide: 0.7, kind }
+            GuideRecord {
+                p,
+                d,
+                radiance,
+                direct: 0.5 * radiance,
+                scattered: radiance,
+                pdf: 0.5,
+                pdf_bsdf: 0.3,
+                pdf_guide: 0.7,
+                pdf_sets: [0.9, 0.5],
+                kind,
+                primary: i % 2 == 0,
+            }
         };
         for _ in 0..2 {
             learner.learn(&[(0..records).map(record).collect()]);

@@ -4,8 +4,8 @@
 use super::directions::{Directions, Step, Unguided};
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{
-    Arena, Bxdf, BxdfSample, Goal, GuidedDirections, Lobes, MOST_GUIDED, Outlook, RecordKind, SurfaceHit, Transport,
-    is_guided,
+    Arena, Bxdf, BxdfSample, Goal, GuideSets, GuidedDirections, GuidedVertex, Lobes, MOST_GUIDED, Outlook, RecordKind,
+    SurfaceHit, Transport, is_guided,
 };
 use lucerna_core::math::{ONE_MINUS_EPSILON, Vec2, Vec3};
 use lucerna_core::render::{Guidance, Notebook, Place, Scattering};
@@ -35,24 +35,30 @@ pub(super) struct Learnt<'v> {
     teaches: bool,
     /// The BSDF also has delta lobes.
     hybrid: bool,
+    /// The first vertex of a path from the camera.
+    primary: bool,
+    /// What the guide knows here follows the product with the BSDF already.
+    follows_product: bool,
 }
 
 impl<'a> Directions for Guided<'a> {
     type Here = Learnt<'a>;
 
     #[inline]
-    fn here(&self, hit: &SurfaceHit, bxdf: &dyn Bxdf) -> Learnt<'a> {
+    fn here(&self, hit: &SurfaceHit, bxdf: &dyn Bxdf, primary: bool) -> Learnt<'a> {
         let lobes = bxdf.lobes();
         let hybrid = lobes.has_delta();
         let directs = self.guidance.subjects.directions;
         if !directs || !is_guided(bxdf, lobes, self.guidance.least_roughness) {
-            return Learnt { guide: None, teaches: false, hybrid };
+            return Learnt { guide: None, teaches: false, hybrid, primary, follows_product: false };
         }
-        let guide = self.guidance.field.at(hit, lobes.is_one_sided(), self.arena).and_then(|guide| {
+        let vertex = GuidedVertex { one_sided: lobes.is_one_sided(), primary };
+        let guide = self.guidance.field.at(hit, vertex, self.arena).and_then(|guide| {
             let p = guide.p_guide().clamp(0.0, MOST_GUIDED);
             (p > 0.0).then_some((guide, p))
         });
-        Learnt { guide, teaches: true, hybrid }
+        let follows_product = primary && self.guidance.sets == GuideSets::PrimaryProduct;
+        Learnt { guide, teaches: true, hybrid, primary, follows_product }
     }
 
     #[inline]
@@ -135,6 +141,9 @@ impl<'a> Directions for Guided<'a> {
         choice: f32,
     ) -> Option<Step> {
         let Some((guide, p_guide)) = here.guide else { return Unguided::sample((), hit, bxdf, u1, u2) };
+        if here.follows_product {
+            return Self::sample(here, hit, bxdf, u1, u2);
+        }
         let mut tried = Reservoir::new(choice);
         for i in 0..candidates {
             let u1 = (u1 + i as f32 / candidates as f32).fract().min(ONE_MINUS_EPSILON);
@@ -225,7 +234,12 @@ impl<'a> Directions for Guided<'a> {
         let Step { d, choice, pdf_bsdf, pdf_guide, .. } = *step;
         // One over what the direction counts: a density in expectation, if there were several candidates.
         let pdf = pdf / choice;
-        self.notes.scattered(Scattering { p: hit.p, d, weight, pdf, pdf_bsdf, pdf_guide, kind });
+        let pdf_sets = match here.guide {
+            Some((guide, _)) if self.guidance.sets == GuideSets::DirectIndirect => guide.pdf_sets(d),
+            _ => [0.0; 2],
+        };
+        let primary = here.primary;
+        self.notes.scattered(Scattering { p: hit.p, d, weight, pdf, pdf_bsdf, pdf_guide, pdf_sets, primary, kind });
     }
 
     #[inline]

@@ -94,7 +94,7 @@ pub(super) fn trace<'v, D: Directions<Here: 'v>, R: Decides>(
             let bxdf = bsdf.resolve(&hit, arena);
             let here = match resumed.take() {
                 Some(here) if R::BRANCHES => here,
-                _ => directions.here(&hit, bxdf),
+                _ => directions.here(&hit, bxdf, depth == 0),
             };
             let lobes = bsdf.lobes();
             // Whether the sample is transparent does not depend on what roulette decides.

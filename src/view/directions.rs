@@ -7,7 +7,9 @@
 
 use super::letters::{self, LINE, STEP};
 use lucerna_core::image::{Image, srgb_to_linear};
-use lucerna_core::interfaces::{Arena, GuideField, MOST_GUIDED, Sensor, SurfaceHit, Transport, is_guided};
+use lucerna_core::interfaces::{
+    Arena, GuideField, GuidedVertex, MOST_GUIDED, Sensor, SurfaceHit, Transport, is_guided,
+};
 use lucerna_core::math::{UVec2, Vec2, Vec3};
 use lucerna_core::scene::Scene;
 use std::f32::consts::{PI, TAU};
@@ -101,7 +103,8 @@ impl Learned<'_> {
         let bxdf = self.scene.bsdf(&hit).resolve(&hit, &arena);
         let lobes = bxdf.lobes();
         let guided = is_guided(bxdf, lobes, self.least_roughness);
-        let guide = self.field.at(&hit, lobes.is_one_sided(), &arena);
+        let vertex = GuidedVertex { one_sided: lobes.is_one_sided(), primary: true };
+        let guide = self.field.at(&hit, vertex, &arena);
         let p_guide = guide.filter(|_| guided).map_or(0.0, |guide| guide.p_guide().clamp(0.0, MOST_GUIDED));
         let of_bsdf = |d: Vec3| bxdf.eval_pdf(hit.wi, hit.to_local(d), Transport::Radiance).1;
         if let Some(guide) = guide {

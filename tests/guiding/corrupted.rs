@@ -2,8 +2,8 @@
 
 use super::cone;
 use lucerna::core::interfaces::{
-    Arena, Guide, GuideField, GuideLearner, GuideRecord, GuidedDirections, Outlook, SurfaceHit, Training, VertexRecord,
-    mix,
+    Arena, Guide, GuideField, GuideLearner, GuideRecord, GuideSets, GuidedDirections, GuidedVertex, Outlook,
+    SurfaceHit, Training, VertexRecord, mix,
 };
 use lucerna::core::math::{Aabb, Vec2, Vec3};
 use lucerna::core::sampling::warp::square_to_sphere;
@@ -26,6 +26,7 @@ pub const PLUGIN: Plugin = Plugin {
         Param::float_opt("p_guide", "probability of the guide; as learnt if unset"),
         Param::string("outlook", "learnt", "what is told to roulette: learnt, zero, huge, nan, or random"),
         Param::int("candidates", 1, "directions tried at a vertex"),
+        Param::string("sets", "one", "sets of directions"),
         Param::choice("nee", &["never", "kickstart", "always"], "always", "when lights are sampled"),
     ]],
     build: Constructor::Guide(build),
@@ -45,6 +46,7 @@ fn build(p: &Properties<'_>) -> Built<dyn Guide> {
         parameters: vec![
             value("product", lucerna::core::scene::Value::String("resampling".to_owned())),
             value("candidates", lucerna::core::scene::Value::Integer(p.int("candidates"))),
+            value("sets", lucerna::core::scene::Value::String(p.string("sets").to_owned())),
             value("nee", lucerna::core::scene::Value::String(p.choice("nee").to_owned())),
             // Small, so that a few samples make many cells.
             value("spatial_threshold", lucerna::core::scene::Value::Float(200.0)),
@@ -124,13 +126,17 @@ fn key(p: Vec3) -> u64 {
 }
 
 impl GuideField for Field {
-    fn at<'g>(&'g self, hit: &SurfaceHit, one_sided: bool, arena: &'g Arena) -> Option<&'g dyn GuidedDirections> {
+    fn at<'g>(&'g self, hit: &SurfaceHit, vertex: GuidedVertex, arena: &'g Arena) -> Option<&'g dyn GuidedDirections> {
         if self.spoils.way == "empty" {
             return None;
         }
-        let inner = self.inner.at(hit, one_sided, arena)?;
+        let inner = self.inner.at(hit, vertex, arena)?;
         let p_guide = self.spoils.p_guide.unwrap_or_else(|| inner.p_guide());
         Some(arena.alloc(Spoilt { inner, way: &self.spoils.way, p_guide, key: key(hit.p) }))
+    }
+
+    fn sets(&self) -> GuideSets {
+        self.inner.sets()
     }
 
     fn incident(&self, p: Vec3, d: Vec3) -> Option<f32> {

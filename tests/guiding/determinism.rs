@@ -20,13 +20,16 @@ fn render(guide: &str, threads: usize, budget: Budget, control: &Control<'_>) ->
 }
 
 /// Every way of learning, with small cells so that there are many.
-const GUIDES: [&str; 4] = [
+const GUIDES: [&str; 6] = [
     "<guide type='sd_tree'><float name='spatial_threshold' value='100'/></guide>",
     "<guide type='sd_tree'><float name='spatial_threshold' value='100'/><string name='spatial_filter' value='box'/>
      <string name='nee' value='kickstart'/></guide>",
     "<guide type='sd_tree'><float name='spatial_threshold' value='100'/><string name='spatial_filter' value='nearest'/>
      <string name='directional_filter' value='nearest'/><float name='p_guide' value='0.5'/></guide>",
     "<guide type='sd_tree'><float name='spatial_threshold' value='100'/><string name='product' value='resampling'/></guide>",
+    "<guide type='sd_tree'><float name='spatial_threshold' value='100'/><string name='sets' value='direct_indirect'/></guide>",
+    "<guide type='sd_tree'><float name='spatial_threshold' value='100'/><string name='sets' value='primary_product'/>
+     <string name='spatial_filter' value='box'/></guide>",
 ];
 
 #[test]
@@ -36,7 +39,9 @@ fn hc_p08_the_number_of_threads_changes_no_bit() {
         assert!(one.iter().any(|bits| f32::from_bits(*bits) > 0.0), "black");
         for threads in [2, 7] {
             let (report, bits) = render(guide, threads, Budget::Samples(40), &Control::new());
-            assert!(report.spp == 40 && !report.stopped && report.notes.len() == 1);
+            assert!(
+                report.spp == 40 && !report.stopped && report.notes.len() == 1 + usize::from(guide.contains("sets"))
+            );
             assert!(bits == one, "{threads} threads: {guide}");
         }
     }

@@ -1,7 +1,9 @@
 //! Fields that were trained on light made up here: densities are those of the samples and integrate to one.
 
 use super::cone;
-use lucerna::core::interfaces::{Arena, Guide, GuideLearner, GuideRecord, GuidedDirections, RecordKind, SurfaceHit};
+use lucerna::core::interfaces::{
+    Arena, Guide, GuideLearner, GuideRecord, GuidedDirections, GuidedVertex, RecordKind, SurfaceHit,
+};
 use lucerna::core::math::{Aabb, Frame, Vec2, Vec3};
 use lucerna::core::sampling::Pcg32;
 use lucerna::core::sampling::warp::square_to_sphere;
@@ -30,7 +32,19 @@ fn random(pcg: &mut Pcg32) -> Vec2 {
 
 pub fn record(p: Vec3, d: Vec3, radiance: f32, pdf: f32) -> GuideRecord {
     let kind = RecordKind::Mixed;
-    GuideRecord { p, d, radiance, scattered: radiance, pdf, pdf_bsdf: pdf, pdf_guide: pdf, kind }
+    GuideRecord {
+        p,
+        d,
+        radiance,
+        direct: 0.0,
+        scattered: radiance,
+        pdf,
+        pdf_bsdf: pdf,
+        pdf_guide: pdf,
+        pdf_sets: [pdf; 2],
+        kind,
+        primary: false,
+    }
 }
 
 /// A lamp that is seen from everywhere, narrower from further away, and a sky.
@@ -39,7 +53,8 @@ fn light(p: Vec3, pcg: &mut Pcg32) -> GuideRecord {
     let cutoff = 0.999 - 0.1 * p.x;
     if pcg.next_f32() < 0.5 {
         let frame = Frame::from_normal(towards);
-        return record(p, frame.to_world(cone::sample(random(pcg), cutoff)), 5.0, 0.5 * cone::pdf(cutoff));
+        let lamp = record(p, frame.to_world(cone::sample(random(pcg), cutoff)), 5.0, 0.5 * cone::pdf(cutoff));
+        return GuideRecord { direct: 5.0, ..lamp };
     }
     let d = square_to_sphere(random(pcg));
     record(p, d, if d.y > 0.0 { 0.3 } else { 0.0 }, 0.5 / (4.0 * PI))
@@ -51,7 +66,7 @@ pub fn train(learner: &mut dyn GuideLearner, rounds: u32, records: usize) {
         let mut tiles = vec![Vec::new(); 4];
         for i in 0..records {
             let p = Vec3::new(pcg.next_f32(), pcg.next_f32(), pcg.next_f32() * pcg.next_f32());
-            tiles[i % 4].push(light(p, &mut pcg));
+            tiles[i % 4].push(GuideRecord { primary: i % 3 == 0, ..light(p, &mut pcg) });
         }
         learner.learn(&tiles);
         learner.refine(1);
@@ -62,6 +77,9 @@ pub fn train(learner: &mut dyn GuideLearner, rounds: u32, records: usize) {
 pub fn hit(p: Vec3, n: Vec3) -> SurfaceHit {
     SurfaceHit { p, n, frame: Frame::from_normal(n), wi: Vec3::Z, ..SurfaceHit::default() }
 }
+
+/// A later vertex, on a surface that reflects only.
+pub const REFLECTS: GuidedVertex = GuidedVertex { one_sided: true, primary: false };
 
 /// Cells along an edge of the square of directions; the trees are no finer.
 const EDGE: usize = 32;
@@ -90,21 +108,30 @@ fn hc_p01_trained_fields_have_the_density_of_their_samples() {
     const CELLS: usize = 100;
     const SAMPLES: usize = 20_000;
     let mut worst: f64 = 0.0;
-    for product in ["none", "cosine"] {
+    let ways = [
+        ("none", "one"),
+        ("cosine", "one"),
+        ("none", "direct_indirect"),
+        ("cosine", "direct_indirect"),
+        ("cosine", "primary_product"),
+    ];
+    for (product, sets) in ways {
         let settings = "<float name='spatial_threshold' value='500'/><integer name='directional_depth' value='5'/>";
-        let guide = guide(&format!("{settings}<string name='product' value='{product}'/>"));
+        let guide =
+            guide(&format!("{settings}<string name='product' value='{product}'/><string name='sets' value='{sets}'/>"));
         let mut learner = guide.start(UNIT);
         train(&mut *learner, 5, 50_000);
         let (field, mut pcg) = (learner.field(), Pcg32::new(9, 9));
-        for _ in 0..CELLS {
+        for number in 0..CELLS {
             let arena = Arena::new();
             let p = Vec3::new(pcg.next_f32(), pcg.next_f32(), pcg.next_f32());
             let normal = square_to_sphere(random(&mut pcg));
-            let Some(directions) = field.at(&hit(p, normal), true, &arena) else { continue };
+            let vertex = GuidedVertex { primary: number % 2 == 0, ..REFLECTS };
+            let Some(directions) = field.at(&hit(p, normal), vertex, &arena) else { continue };
             let expected = expected(directions);
             let integral: f64 = expected.iter().sum();
             worst = worst.max((integral - 1.0).abs());
-            assert!((integral - 1.0).abs() < 1e-3, "{product}: {integral}");
+            assert!((integral - 1.0).abs() < 1e-3, "{product}, {sets}: {integral}");
             let mut observed = vec![0; expected.len()];
             for _ in 0..SAMPLES {
                 let (d, pdf) = directions.sample(random(&mut pcg));
@@ -113,12 +140,15 @@ fn hc_p01_trained_fields_have_the_density_of_their_samples() {
             }
             let expected: Vec<f64> = expected.iter().map(|e| e * SAMPLES as f64 / integral).collect();
             let found = pearson(&observed, &expected);
-            assert!(found.accepts(sidak(0.01, 2 * CELLS)), "{product} at {p}: {found:?}");
+            assert!(found.accepts(sidak(0.01, ways.len() * CELLS)), "{product}, {sets} at {p}: {found:?}");
         }
     }
     measured(
         "hc_p01_trained_fields_have_the_density_of_their_samples",
-        format!("{CELLS} cells twice, with and without the cosine: all pass; integrals within {worst:.0e} of 1"),
+        format!(
+            "{CELLS} cells {} times, with and without the cosine and a second set: all pass; integrals within {worst:.0e} of 1",
+            ways.len()
+        ),
     );
 }
 
@@ -159,7 +189,7 @@ fn hc_p02_records_of_nothing_and_of_extremes_leave_a_sound_field() {
             field.validate().unwrap_or_else(|e| panic!("{number}: {e}"));
             for p in [Vec3::splat(0.5), Vec3::splat(0.1), Vec3::splat(-1e20)] {
                 let arena = Arena::new();
-                match field.at(&hit(p, Vec3::Z), false, &arena) {
+                match field.at(&hit(p, Vec3::Z), GuidedVertex::default(), &arena) {
                     None => assert!(!lit || number == 5 || number == 4, "{number}: nothing at {p}"),
                     Some(directions) => {
                         let (d, pdf) = directions.sample(Vec2::splat(0.5));

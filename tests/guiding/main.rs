@@ -9,6 +9,7 @@ mod field;
 mod kept;
 mod published;
 mod roulette;
+mod sets;
 #[path = "../support/mod.rs"]
 mod support;
 mod unbiased;

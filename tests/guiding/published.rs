@@ -25,7 +25,8 @@ const SPP: u32 = 64;
 /// All combinations of a guide or none, a roulette and a light sampler, but for `path` itself.
 fn methods() -> Vec<Method> {
     let mut names = Vec::new();
-    for guide in ["", "+guide=sd_tree"] {
+    let sets = ["direct_indirect", "primary_product"].map(|sets| format!("+guide=sd_tree:sets={sets}"));
+    for guide in ["", "+guide=sd_tree", &sets[0], &sets[1]] {
         for roulette in ["", "+roulette=adjoint"] {
             for lights in ["", "+light_sampler=power", "+light_sampler=light_tree", "+light_sampler=ris"] {
                 names.push(format!("{PATH}{guide}{roulette}{lights}"));

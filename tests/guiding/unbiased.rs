@@ -63,6 +63,12 @@ fn hc_p06_every_setting_of_the_tree_is_unbiased() {
         guide("<float name='p_guide' value='0'/>"),
         guide("<float name='prior' value='0'/><float name='memory' value='0'/>"),
         guide("<string name='product' value='resampling'/>"),
+        guide("<string name='sets' value='direct_indirect'/>"),
+        guide("<string name='sets' value='direct_indirect'/><string name='nee' value='never'/>"),
+        guide("<string name='sets' value='direct_indirect'/><string name='product' value='resampling'/>"),
+        guide("<string name='sets' value='primary_product'/>"),
+        guide("<string name='sets' value='primary_product'/><float name='roughness_threshold' value='0'/>"),
+        guide("<string name='sets' value='primary_product'/><string name='product' value='resampling'/>"),
         guide(
             "<string name='product' value='resampling'/><integer name='candidates' value='16'/><string name='nee' value='never'/>",
         ),
@@ -84,6 +90,11 @@ fn hc_p06_corrupted_guides_are_unbiased() {
     let mut guides = Vec::new();
     for way in corrupted::WAYS {
         guides.push(format!("<guide type='corrupted'><string name='way' value='{way}'/></guide>"));
+    }
+    for sets in ["direct_indirect", "primary_product"] {
+        guides.push(format!(
+            "<guide type='corrupted'><string name='way' value='random'/><string name='sets' value='{sets}'/></guide>"
+        ));
     }
     for way in ["random", "inverted", "one_direction"] {
         guides.push(format!(

@@ -3,8 +3,9 @@
 use super::cylinder;
 use super::outlook::{SIDES, side};
 use super::quadtree::{CELLS, EDGE, Quadtree, UNIFORM};
+use super::sets::{ApartLeaf, is_lit};
 use super::spatial::SpatialTree;
-use lucerna_core::interfaces::{Arena, GuideField, GuidedDirections, Outlook, SurfaceHit};
+use lucerna_core::interfaces::{Arena, GuideField, GuideSets, GuidedDirections, GuidedVertex, Outlook, SurfaceHit};
 use lucerna_core::math::{Vec2, Vec3};
 use std::f32::consts::PI;
 use std::sync::{Arc, LazyLock};
@@ -15,6 +16,10 @@ pub struct Field {
     pub leaves: Vec<Leaf>,
     /// Whether directions are weighted by the cosine at the vertex.
     pub cosine: bool,
+    /// Whether something is kept apart,
+    pub sets: GuideSets,
+    /// and that, as many as there are leaves; empty if not.
+    pub apart: Vec<ApartLeaf>,
 }
 
 /// What is known in a cell of space.
@@ -31,21 +36,35 @@ pub struct Leaf {
 }
 
 impl GuideField for Field {
-    fn at<'g>(&'g self, hit: &SurfaceHit, one_sided: bool, arena: &'g Arena) -> Option<&'g dyn GuidedDirections> {
-        let leaf = &self.leaves[self.tree.leaf(self.tree.cell(hit.p)).0 as usize];
+    fn at<'g>(&'g self, hit: &SurfaceHit, vertex: GuidedVertex, arena: &'g Arena) -> Option<&'g dyn GuidedDirections> {
+        let index = self.tree.leaf(self.tree.cell(hit.p)).0 as usize;
+        let leaf = &self.leaves[index];
+        if let Some(apart) = self.apart.get(index) {
+            return self.at_apart((leaf, apart), hit, vertex, arena);
+        }
         let tree = leaf.directions.as_deref()?;
-        let normal = hit.frame.n * 1f32.copysign(hit.wi.z);
-        // The integral of the factor over all directions.
-        let (cosines, reach) =
-            if self.cosine && one_sided { (cosines(normal), PI * f32::from(UPRIGHT)) } else { (&[1; CELLS], 4.0 * PI) };
-        Some(arena.alloc(Here::new(tree, leaf.p_guide, cosines, reach)?))
+        Some(arena.alloc(self.here(tree, leaf, hit, vertex.one_sided)?))
+    }
+
+    fn sets(&self) -> GuideSets {
+        self.sets
     }
 
     fn incident(&self, p: Vec3, d: Vec3) -> Option<f32> {
-        let leaf = &self.leaves[self.tree.leaf(self.tree.cell(p)).0 as usize];
-        let tree = leaf.directions.as_deref()?;
-        let (cell, density) = tree.pdf_in_cell(cylinder::of_direction(d));
-        Some(leaf.fluence * UNIFORM * tree.grid[cell].get() * CELLS as f32 * density)
+        let index = self.tree.leaf(self.tree.cell(p)).0 as usize;
+        let leaf = &self.leaves[index];
+        // What is kept apart may be a part of the light; what first hits scatter is none.
+        let apart = self.apart.get(index).filter(|_| self.sets == GuideSets::DirectIndirect);
+        if !is_lit(leaf, apart) {
+            return None;
+        }
+        let radiance = |tree: &Quadtree, fluence: f32| {
+            let (cell, density) = tree.pdf_in_cell(cylinder::of_direction(d));
+            fluence * UNIFORM * tree.grid[cell].get() * CELLS as f32 * density
+        };
+        let of_leaf = leaf.directions.as_deref().map_or(0.0, |tree| radiance(tree, leaf.fluence));
+        let of_apart = apart.and_then(|apart| Some(radiance(apart.directions.as_deref()?, apart.fluence)));
+        Some(of_leaf + of_apart.unwrap_or(0.0))
     }
 
     fn outlook(&self, p: Vec3, n: Vec3) -> Option<Outlook> {
@@ -63,13 +82,41 @@ impl GuideField for Field {
             }
             leaf.directions.iter().try_for_each(|tree| tree.validate())?;
         }
+        let expected = if self.sets == GuideSets::One { 0 } else { self.leaves.len() };
+        if self.apart.len() != expected {
+            return Err("the field does not keep something apart in every leaf".to_owned());
+        }
+        for ApartLeaf { directions, p, fluence } in &self.apart {
+            if !(0.0..=1.0).contains(p) || !(0.0..f32::INFINITY).contains(fluence) {
+                return Err("a leaf has no usable probability or fluence apart".to_owned());
+            }
+            directions.iter().try_for_each(|tree| tree.validate())?;
+        }
         Ok(())
+    }
+}
+
+impl Field {
+    /// A tree of a leaf at a vertex.
+    #[inline]
+    pub(super) fn here<'g>(
+        &self,
+        tree: &'g Quadtree,
+        leaf: &Leaf,
+        hit: &SurfaceHit,
+        one_sided: bool,
+    ) -> Option<Here<'g>> {
+        let normal = hit.frame.n * 1f32.copysign(hit.wi.z);
+        // The integral of the factor over all directions.
+        let (cosines, reach) =
+            if self.cosine && one_sided { (cosines(normal), PI * f32::from(UPRIGHT)) } else { (&[1; CELLS], 4.0 * PI) };
+        Here::new(tree, leaf.p_guide, cosines, reach)
     }
 }
 
 /// A leaf's directions at a vertex. Weights of cells are products that are made when they are needed: most vertices need
 /// few of them, but all need their sums.
-struct Here<'g> {
+pub(super) struct Here<'g> {
     tree: &'g Quadtree,
     /// Factors of the grid's cells.
     cosines: &'g [u8; CELLS],
@@ -77,7 +124,7 @@ struct Here<'g> {
     /// Sums of the weights in the columns of the grid.
     columns: [f32; EDGE],
     /// The sum of all.
-    total: f32,
+    pub(super) total: f32,
     /// What makes a density relative to a uniform one, per solid angle, of a weight.
     scale: f32,
     /// What makes a density before it is weighted a multiple of the mean.
@@ -85,6 +132,11 @@ struct Here<'g> {
 }
 
 impl<'g> Here<'g> {
+    /// A tree that has the cosine in it.
+    pub(super) fn of_product(tree: &'g Quadtree, p_guide: f32) -> Option<Self> {
+        Here::new(tree, p_guide, &[1; CELLS], 4.0 * PI)
+    }
+
     /// `None` if no light comes from where it would be scattered.
     #[inline]
     fn new(tree: &'g Quadtree, p_guide: f32, cosines: &'g [u8; CELLS], reach: f32) -> Option<Self> {

@@ -2,10 +2,11 @@
 //!
 //! | bytes | what |
 //! |---|---|
-//! | `u64`, `u32`, `u16` | records taken in, iterations, whether the limit of memory was reached |
+//! | `u64`, `u32`, `u16`, `u16` | records taken in, iterations, whether the limit of memory was reached, sets of directions (0: one) |
 //! | | the tree over space: number of nodes, two children each |
 //! | `u32` | trees over directions, then each: parts of the flux in the grid, which of its cells are divided, number of nodes, four `u16` each |
 //! | | cells of space, one more than nodes: which tree over directions (0: none), probability of the guide, fluence, records, the descent that learns the probability, shape of the sums, and the sums unless all are 0, what scattering brings |
+//! | | if there are two sets, what each cell keeps apart: which tree over directions, probability, fluence, records, descent, sums |
 //!
 //! Cells that share a tree over directions still do afterwards.
 
@@ -15,9 +16,10 @@ use super::learner::{Cell, Learner};
 use super::mixing::Mixing;
 use super::outlook;
 use super::quadtree::{MOST_LEVELS, Quadtree};
+use super::sets::{self, Apart, ApartLeaf};
 use super::spatial::SpatialTree;
 use super::sums::Sums;
-use lucerna_core::interfaces::{FactValue, GuideFact, GuideField};
+use lucerna_core::interfaces::{FactValue, GuideFact, GuideField, GuideSets};
 use lucerna_core::io::limits::Cursor;
 use lucerna_core::io::sealed::Packer;
 use lucerna_core::io::{IoError, Result};
@@ -28,6 +30,18 @@ use std::sync::Arc;
 /// Bytes of a tree over directions at least: the grid, which cells are divided, number of nodes.
 const LEAST_TREE: u64 = 64 * 2 + 8 + 4;
 
+/// What a number means.
+const SETS: [GuideSets; 3] = [GuideSets::One, GuideSets::DirectIndirect, GuideSets::PrimaryProduct];
+
+/// A number of records.
+fn records(from: &mut Cursor<'_>) -> Result<f64> {
+    let count = from.f64("a cell")?;
+    match (0.0..=f64::MAX).contains(&count) {
+        true => Ok(count),
+        false => Err(IoError::new("a cell has no usable number of records")),
+    }
+}
+
 impl Learner {
     /// All that is known.
     pub(super) fn pack(&self) -> Vec<u8> {
@@ -35,9 +49,11 @@ impl Learner {
         to.u64(self.taken);
         to.u32(self.iterations);
         to.u16(self.full.into());
+        to.u16(SETS.iter().position(|sets| *sets == self.settings.sets).unwrap_or(0) as u16);
         self.tree.pack(&mut to);
         let (mut trees, mut numbers) = (Vec::new(), HashMap::new());
-        for tree in self.cells.iter().filter_map(|cell| cell.directions.as_ref()) {
+        let of_cells = self.cells.iter().map(|cell| &cell.directions);
+        for tree in of_cells.chain(self.apart.iter().map(|apart| &apart.directions)).flatten() {
             numbers.entry(Arc::as_ptr(tree)).or_insert_with(|| {
                 trees.push(tree);
                 trees.len() as u32
@@ -45,14 +61,23 @@ impl Learner {
         }
         to.u32(trees.len() as u32);
         trees.iter().for_each(|tree| tree.pack(&mut to));
+        let number = |tree: &Option<Arc<Quadtree>>| tree.as_ref().map_or(0, |tree| numbers[&Arc::as_ptr(tree)]);
         for (cell, leaf) in self.cells.iter().zip(&self.field.leaves) {
-            to.u32(cell.directions.as_ref().map_or(0, |tree| numbers[&Arc::as_ptr(tree)]));
+            to.u32(number(&cell.directions));
             to.f32(leaf.p_guide);
             to.f32(cell.fluence);
             to.f64(cell.count);
             cell.mixing.pack(&mut to);
             cell.sums.pack(&mut to);
             outlook::pack(&cell.outlooks, &leaf.outlooks, &mut to);
+        }
+        for (apart, leaf) in self.apart.iter().zip(&self.field.apart) {
+            to.u32(number(&apart.directions));
+            to.f32(leaf.p);
+            to.f32(apart.fluence);
+            to.f64(apart.count);
+            apart.mixing.pack(&mut to);
+            apart.sums.pack(&mut to);
         }
         to.0
     }
@@ -61,39 +86,53 @@ impl Learner {
     ///
     /// # Errors
     /// If the bytes are not what a learner packs.
-    pub(super) fn unpack(settings: Settings, bounds: Aabb, bytes: &[u8]) -> Result<Self> {
+    pub(super) fn unpack(mut settings: Settings, bounds: Aabb, bytes: &[u8]) -> Result<Self> {
         let mut from = Cursor::new(bytes);
         let (taken, iterations) = (from.u64("the records taken in")?, from.u32("the iterations")?);
         let full = from.u16("the limit of memory")? != 0;
+        let sets = SETS.get(usize::from(from.u16("the sets of directions")?)).copied();
+        let sets = sets.ok_or_else(|| IoError::new("has sets of directions that are not known"))?;
+        if settings.sets_asked && settings.sets != sets {
+            let [theirs, ours] = [sets, settings.sets].map(sets::name);
+            return Err(IoError::new(format!("was learnt with sets \"{theirs}\", not \"{ours}\"")));
+        }
+        settings.sets = sets;
         let tree = SpatialTree::unpack(&mut from, bounds)?;
         let count = from.count(LEAST_TREE, "trees over directions")?;
         let trees: Vec<Arc<Quadtree>> =
             (0..count).map(|_| Quadtree::unpack(&mut from).map(Arc::new)).collect::<Result<_>>()?;
         let (mut cells, mut leaves) = (Vec::new(), Vec::new());
+        let numbered = |number: u32| match number {
+            0 => Ok(None),
+            number => {
+                let found = trees.get(number as usize - 1);
+                Ok(Some(found.ok_or_else(|| IoError::new("a cell has directions that are not there"))?.clone()))
+            }
+        };
         for _ in 0..tree.leaves() {
-            let directions = match from.u32("a cell")? {
-                0 => None,
-                number => {
-                    let found = trees.get(number as usize - 1);
-                    Some(found.ok_or_else(|| IoError::new("a cell has directions that are not there"))?.clone())
-                }
-            };
+            let directions = numbered(from.u32("a cell")?)?;
             let (p_guide, fluence) = (from.f32("a cell")?, from.f32("a cell")?);
             let p_guide = settings.p_guide.unwrap_or(p_guide);
-            let count = from.f64("a cell")?;
-            if !(0.0..=f64::MAX).contains(&count) {
-                return Err(IoError::new("a cell has no usable number of records"));
-            }
+            let count = records(&mut from)?;
             let mixing = Mixing::unpack(&mut from)?;
             let sums = Sums::unpack(&mut from)?;
             let (outlooks, known) = outlook::unpack(&mut from)?;
             leaves.push(Leaf { directions: directions.clone(), p_guide, fluence, outlooks: known });
             cells.push(Cell { sums, count, mixing, halved: 0, directions, fluence, outlooks });
         }
+        let (mut apart, mut known) = (Vec::new(), Vec::new());
+        for _ in (0..tree.leaves()).filter(|_| sets != GuideSets::One) {
+            let directions = numbered(from.u32("a cell")?)?;
+            let (p, fluence, count) = (from.f32("a cell")?, from.f32("a cell")?, records(&mut from)?);
+            let p = settings.p_guide.filter(|_| sets == GuideSets::PrimaryProduct).unwrap_or(p);
+            let (mixing, sums) = (Mixing::unpack(&mut from)?, Sums::unpack(&mut from)?);
+            known.push(ApartLeaf { directions: directions.clone(), p, fluence });
+            apart.push(Apart { sums, count, mixing, directions, fluence });
+        }
         from.end()?;
-        let field = Arc::new(Field { tree: tree.clone(), leaves, cosine: settings.cosine });
+        let field = Arc::new(Field { tree: tree.clone(), leaves, cosine: settings.cosine, sets, apart: known });
         field.validate().map_err(IoError::new)?;
-        Ok(Learner { settings, tree, cells, field, taken, iterations, full })
+        Ok(Learner { settings, tree, cells, apart, field, taken, iterations, full })
     }
 
     /// What it holds, in numbers.
@@ -114,7 +153,7 @@ impl Learner {
         };
         let p_mean = leaves.iter().map(|leaf| f64::from(leaf.p_guide)).sum::<f64>() / leaves.len() as f64;
         let known = || leaves.iter().filter(|leaf| leaf.directions.is_some());
-        let facts = [
+        let mut facts = vec![
             ("iterations", FactValue::Count(self.iterations.into())),
             ("records", FactValue::Count(self.taken)),
             ("cells of space", FactValue::Count(leaves.len() as u64)),
@@ -130,6 +169,32 @@ impl Learner {
             ("cells of space by depth", FactValue::PerDepth(spatial)),
             ("cells of directions by depth", FactValue::PerDepth(directional[..=deepest].to_vec())),
         ];
+        let names = match self.settings.sets {
+            GuideSets::One => None,
+            GuideSets::DirectIndirect => Some([
+                "nodes for light met directly",
+                "mean part of light met directly",
+                "part of light met directly",
+                "fluence of light met directly",
+            ]),
+            GuideSets::PrimaryProduct => Some([
+                "nodes for first hits",
+                "mean probability of the guide at first hits",
+                "probability of the guide at first hits",
+                "light scattered at first hits",
+            ]),
+        };
+        if let Some([nodes, mean, part, fluence]) = names {
+            let known = || self.field.apart.iter().filter(|leaf| leaf.directions.is_some());
+            let count = known().filter_map(|leaf| leaf.directions.as_ref()).map(|tree| tree.nodes()).sum::<usize>();
+            let p = self.field.apart.iter().map(|leaf| f64::from(leaf.p)).sum::<f64>() / leaves.len() as f64;
+            facts.extend([
+                (nodes, FactValue::Count(count as u64)),
+                (mean, FactValue::Number(p)),
+                (part, range(&mut known().map(|leaf| leaf.p))),
+                (fluence, range(&mut known().map(|leaf| leaf.fluence))),
+            ]);
+        }
         facts.into_iter().map(|(name, value)| GuideFact { name, value }).collect()
     }
 }

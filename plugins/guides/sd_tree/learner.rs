@@ -24,11 +24,12 @@ use super::mixing::Mixing;
 use super::outlook::{SIDES, Totals, side};
 use super::prior;
 use super::quadtree::Quadtree;
+use super::sets::Apart;
 use super::spatial::SpatialTree;
 use super::sums::{Refinement, Sums};
 use super::{DirectionalFilter, Settings, SpatialFilter};
-use lucerna_core::interfaces::{GuideFact, GuideField, GuideLearner, GuideRecord, VertexRecord, mix};
-use lucerna_core::math::Aabb;
+use lucerna_core::interfaces::{GuideFact, GuideField, GuideLearner, GuideRecord, GuideSets, VertexRecord, mix};
+use lucerna_core::math::{Aabb, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -43,6 +44,8 @@ pub struct Learner {
     pub(super) settings: Settings,
     pub(super) tree: SpatialTree,
     pub(super) cells: Vec<Cell>,
+    /// What cells keep apart, as many; empty if nothing.
+    pub(super) apart: Vec<Apart>,
     pub(super) field: Arc<Field>,
     /// Records taken in, over all iterations: what their random numbers depend on.
     pub(super) taken: u64,
@@ -68,19 +71,27 @@ pub(super) struct Cell {
 
 /// A record's part in a cell: which cell, tile and record, and how much of it.
 #[derive(Clone, Copy)]
-struct Part {
-    cell: u32,
-    tile: u32,
-    record: u32,
-    share: f32,
+pub(super) struct Part {
+    pub cell: u32,
+    pub tile: u32,
+    pub record: u32,
+    pub share: f32,
 }
 
 impl Learner {
     pub fn new(settings: Settings, bounds: Aabb) -> Self {
         let tree = SpatialTree::new(bounds);
-        let field = Arc::new(Field { tree: tree.clone(), leaves: vec![Leaf::default()], cosine: settings.cosine });
+        let sets = settings.sets;
+        let apart = vec![Apart::default(); usize::from(sets != GuideSets::One)];
+        let field = Arc::new(Field {
+            tree: tree.clone(),
+            leaves: vec![Leaf::default()],
+            cosine: settings.cosine,
+            sets,
+            apart: apart.iter().map(|apart| apart.leaf(&settings)).collect(),
+        });
         let cells = vec![Cell::default()];
-        Learner { settings, tree, cells, field, taken: 0, iterations: 0, full: false }
+        Learner { settings, tree, cells, apart, field, taken: 0, iterations: 0, full: false }
     }
 
     /// Where the record goes, with the part of it in each cell.
@@ -147,7 +158,7 @@ impl Learner {
         let tree = |cell: &Cell| cell.directions.as_ref().map_or(0, |tree| tree.bytes());
         let cells =
             self.cells.iter().map(|cell| size_of::<Cell>() + size_of::<Leaf>() + cell.sums.bytes() + tree(cell));
-        2 * self.tree.bytes() + cells.sum::<usize>()
+        2 * self.tree.bytes() + cells.sum::<usize>() + self.apart.iter().map(Apart::bytes).sum::<usize>()
     }
 
     /// Divides cells of space which got many records. Both halves go on with what is known in the whole.
@@ -155,17 +166,22 @@ impl Learner {
         let most = self.settings.spatial_threshold * f64::from(spp).sqrt();
         let mut left = self.settings.max_bytes.saturating_sub(self.bytes());
         let mut full = false;
-        let cells = std::cell::RefCell::new(&mut self.cells);
+        let cells = std::cell::RefCell::new((&mut self.cells, &mut self.apart));
         let wanted = |leaf: u32, _| {
-            let cell = &cells.borrow()[leaf as usize];
+            let (cells, apart) = &*cells.borrow();
+            let (cell, apart) = (&cells[leaf as usize], apart.get(leaf as usize));
             let needed = size_of::<Cell>() + size_of::<Leaf>() + cell.sums.bytes() + 2 * size_of::<[u32; 2]>();
-            let divide = cell.count > most;
+            let needed = needed + apart.map_or(0, |apart| size_of::<Apart>() + apart.sums.bytes());
+            let divide = cell.count + apart.map_or(0.0, |apart| apart.count) > most;
             full |= divide && needed > left;
             left = if divide { left.saturating_sub(needed) } else { left };
             divide && left > 0
         };
         self.tree.split(wanted, |old, _| {
-            let mut cells = cells.borrow_mut();
+            let (cells, apart) = &mut *cells.borrow_mut();
+            if let Some(half) = apart.get_mut(old as usize).map(Apart::halve) {
+                apart.push(half);
+            }
             cells[old as usize].count *= 0.5;
             cells[old as usize].outlooks.iter_mut().for_each(Totals::halve);
             cells[old as usize].halved += 1;
@@ -184,11 +200,13 @@ impl Learner {
             kept: self.settings.memory,
         };
         let old: Vec<Sums> = self.cells.iter_mut().map(|cell| std::mem::take(&mut cell.sums)).collect();
+        let old_apart: Vec<Sums> = self.apart.iter_mut().map(|apart| std::mem::take(&mut apart.sums)).collect();
         let fits = (0..MOST_COARSENINGS).any(|_| {
             self.cells.par_iter_mut().zip(&old).for_each(|(cell, old)| {
-                let kept = how.kept * (-f64::from(cell.halved)).exp2();
+                let kept = how.kept * cell.left();
                 cell.sums = old.refined(Refinement { kept, ..how });
             });
+            self.refine_apart(&old_apart, how);
             let fits = self.bytes() <= self.settings.max_bytes;
             self.full |= !fits;
             how.threshold *= 2.0;
@@ -200,13 +218,16 @@ impl Learner {
                 cell.sums = Sums::default();
             }
         }
+        if !fits {
+            self.apart.iter_mut().for_each(|apart| apart.sums = Sums::default());
+        }
     }
 }
 
 /// Each cell that has parts, with them.
-fn filled<'a>(cells: &'a mut [Cell], parts: &'a [Part]) -> Vec<(&'a mut Cell, &'a [Part])> {
+pub(super) fn filled<'a, T>(cells: &'a mut [T], parts: &'a [Part]) -> Vec<(&'a mut T, &'a [Part])> {
     let by_cell: Vec<&[Part]> = parts.chunk_by(|a, b| a.cell == b.cell).collect();
-    let mut filled: Vec<(&mut Cell, &[Part])> = Vec::with_capacity(by_cell.len());
+    let mut filled: Vec<(&mut T, &[Part])> = Vec::with_capacity(by_cell.len());
     let mut rest = cells;
     let mut passed = 0;
     for parts in by_cell {
@@ -221,6 +242,10 @@ fn filled<'a>(cells: &'a mut [Cell], parts: &'a [Part]) -> Vec<(&'a mut Cell, &'
 impl GuideLearner for Learner {
     fn learn(&mut self, tiles: &[Vec<GuideRecord>]) {
         let parts = self.parts(tiles, |record, number, put| self.place(record, number, put));
+        self.taken += tiles.iter().map(|tile| tile.len() as u64).sum::<u64>();
+        if !self.apart.is_empty() {
+            return self.learn_apart(tiles, &parts);
+        }
         let filled = filled(&mut self.cells, &parts);
         let (filter, learns_mixing) = (self.settings.directional_filter, self.settings.p_guide.is_none());
         filled.into_par_iter().for_each(|(cell, parts)| {
@@ -232,7 +257,6 @@ impl GuideLearner for Learner {
                 }
             }
         });
-        self.taken += tiles.iter().map(|tile| tile.len() as u64).sum::<u64>();
     }
 
     fn learn_outlook(&mut self, tiles: &[Vec<VertexRecord>]) {
@@ -258,9 +282,11 @@ impl GuideLearner for Learner {
                 cell.directions = Some(Arc::new(Quadtree::new(grid, &cell.sums, prior)));
             });
         }
+        self.know_apart();
         self.split(spp);
         self.fade();
         self.cells.iter_mut().for_each(|cell| cell.count *= self.settings.memory);
+        self.apart.iter_mut().for_each(|apart| apart.count *= self.settings.memory);
         let leaf = |cell: &Cell| Leaf {
             directions: cell.directions.clone(),
             p_guide: p_guide.unwrap_or_else(|| cell.mixing.p_guide()),
@@ -268,7 +294,13 @@ impl GuideLearner for Learner {
             outlooks: std::array::from_fn(|side| cell.outlooks[side].outlook()),
         };
         let leaves = self.cells.iter().map(leaf).collect();
-        self.field = Arc::new(Field { tree: self.tree.clone(), leaves, cosine: self.settings.cosine });
+        self.field = Arc::new(Field {
+            tree: self.tree.clone(),
+            leaves,
+            cosine: self.settings.cosine,
+            sets: self.settings.sets,
+            apart: self.apart_leaves(),
+        });
         self.iterations += 1;
     }
 
@@ -289,6 +321,7 @@ impl GuideLearner for Learner {
             self.tree.depth(),
             nodes as f64 / count,
         )];
+        lines.extend(self.apart_summary());
         if self.full {
             lines.push("sd_tree: the limit of memory was reached, the tree is coarser than it should be".to_owned());
         }
@@ -307,16 +340,26 @@ impl GuideLearner for Learner {
 impl Cell {
     /// Takes a part of a record in.
     #[inline]
-    fn take(&mut self, record: &GuideRecord, share: f64, filter: DirectionalFilter) {
+    pub(super) fn take(&mut self, record: &GuideRecord, share: f64, filter: DirectionalFilter) {
         self.count += share;
-        let flux = share * f64::from(record.radiance) / f64::from(record.pdf);
-        if !(flux > 0.0 && flux.is_finite()) {
-            return;
-        }
-        let p = cylinder::of_direction(record.d);
-        match filter {
-            DirectionalFilter::Nearest => self.sums.add(p, flux),
-            DirectionalFilter::Box => self.sums.add_box(p, flux),
-        }
+        put(&mut self.sums, record.d, share * f64::from(record.radiance) / f64::from(record.pdf), filter);
+    }
+
+    /// The part of its sums that each half has, after it was halved.
+    pub(super) fn left(&self) -> f64 {
+        (-f64::from(self.halved)).exp2()
+    }
+}
+
+/// Adds flux from a direction, if it is any.
+#[inline]
+pub(super) fn put(sums: &mut Sums, d: Vec3, flux: f64, filter: DirectionalFilter) {
+    if !(flux > 0.0 && flux.is_finite()) {
+        return;
+    }
+    let p = cylinder::of_direction(d);
+    match filter {
+        DirectionalFilter::Nearest => sums.add(p, flux),
+        DirectionalFilter::Box => sums.add_box(p, flux),
     }
 }

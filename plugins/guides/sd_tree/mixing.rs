@@ -1,5 +1,5 @@
-//! How often a direction comes from the guide: learnt by following the gradient of the divergence between what is
-//! sampled and what would be ideal (Müller 2019, section 10.5).
+//! How often a direction comes from the guide, and from which of its sets: learnt by following the gradient of the
+//! divergence between what is sampled and what would be ideal (Müller 2019, section 10.5).
 
 use lucerna_core::interfaces::{GuideRecord, RecordKind};
 use lucerna_core::io::limits::Cursor;
@@ -22,7 +22,7 @@ pub const LIMITS: (f32, f32) = (0.05, 0.95);
 /// The state of the descent in one leaf.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mixing {
-    /// The probability of the BSDF is the logistic function of it.
+    /// The probability of the BSDF, or of the first of two sets, is the logistic function of it.
     theta: f32,
     /// First and second moment of the gradient.
     m: f32,
@@ -71,30 +71,54 @@ impl Mixing {
 
     /// Probability of the guide.
     pub fn p_guide(&self) -> f32 {
-        (1.0 - self.p_bsdf()).clamp(LIMITS.0, LIMITS.1)
+        (1.0 - self.p()).clamp(LIMITS.0, LIMITS.1)
     }
 
-    fn p_bsdf(&self) -> f32 {
+    /// Probability of the first of two sets, given that the direction comes from the guide.
+    pub fn p_first(&self) -> f32 {
+        self.p().clamp(LIMITS.0, LIMITS.1)
+    }
+
+    fn p(&self) -> f32 {
         1.0 / (1.0 + (-self.theta).exp())
     }
 
-    /// Takes in a record.
+    /// Takes in a record, to learn the probability of the BSDF.
     pub fn step(&mut self, record: &GuideRecord) {
         let GuideRecord { scattered, pdf_bsdf, pdf_guide, kind, .. } = *record;
-        if kind == RecordKind::Unguided {
-            return;
+        match kind {
+            RecordKind::Unguided => {}
+            // The guide has no part in a delta lobe.
+            RecordKind::Delta => self.follow(scattered, |p| 1.0 / p),
+            RecordKind::Mixed => {
+                self.follow(scattered, |p| (pdf_bsdf - pdf_guide) / (p * pdf_bsdf + (1.0 - p) * pdf_guide));
+            }
         }
+    }
+
+    /// Takes in a record, to learn the probability of the first of two sets in a guide that has this probability itself.
+    pub fn step_sets(&mut self, record: &GuideRecord, p_guide: f32) {
+        let GuideRecord { scattered, pdf_bsdf, pdf_sets: [first, second], kind, .. } = *record;
+        // A delta lobe says nothing about either, nor does a place that has one alone.
+        if kind == RecordKind::Mixed && first != second {
+            let rest = (1.0 - p_guide) * pdf_bsdf;
+            self.follow(scattered, |p| {
+                p_guide * (first - second) / (rest + p_guide * (p * first + (1.0 - p) * second))
+            });
+        }
+    }
+
+    /// Goes a step, where a mixture in which the first part has probability p has the density q, and (∂q/∂p)/q is
+    /// `slope(p)`.
+    #[inline(always)]
+    fn follow(&mut self, scattered: f32, slope: impl FnOnce(f32) -> f32) {
         self.sum += f64::from(scattered);
         self.count += 1.0;
         if scattered <= 0.0 {
             return;
         }
-        let p = self.p_bsdf();
-        let share = match kind {
-            // The guide has no part in a delta lobe.
-            RecordKind::Delta => 1.0 / p,
-            _ => (pdf_bsdf - pdf_guide) / (p * pdf_bsdf + (1.0 - p) * pdf_guide),
-        };
+        let p = self.p();
+        let share = slope(p);
         let product = (f64::from(scattered) / (self.sum / self.count)) as f32;
         let gradient = -product * share * p * (1.0 - p) + REGULARISATION * self.theta;
         if gradient.is_finite() {
@@ -139,11 +163,14 @@ mod tests {
                 p: Vec3::ZERO,
                 d: Vec3::Z,
                 radiance,
+                direct: 0.0,
                 scattered,
                 pdf,
                 pdf_bsdf: 1.0,
                 pdf_guide,
+                pdf_sets: [0.0; 2],
                 kind,
+                primary: false,
             });
         }
         mixing.p_guide()
@@ -161,6 +188,86 @@ mod tests {
         }
     }
 
+    /// The same with two sets, one uniform on the first tenth, the other on the next two. What is ideal is the mixture of
+    /// given probabilities; both are learnt at once, by what they are at the start of a round of 500 records.
+    fn learn_sets(ideal: [f32; 2], scale: f32, rounds: u32) -> [f32; 2] {
+        let densities = |x: f32| [if x < 0.1 { 10.0 } else { 0.0 }, if (0.1..0.3).contains(&x) { 5.0 } else { 0.0 }];
+        let mixture = |[p, c]: [f32; 2], x: f32| {
+            let [first, second] = densities(x);
+            (1.0 - p) + p * (c * first + (1.0 - c) * second)
+        };
+        let (mut of_guide, mut of_first, mut pcg) = (Mixing::default(), Mixing::default(), Pcg32::new(7, 7));
+        for _ in 0..rounds {
+            let used = [of_guide.p_guide(), of_first.p_first()];
+            for _ in 0..500 {
+                let u = pcg.next_f32();
+                let x = match (pcg.next_f32() < used[0], pcg.next_f32() < used[1]) {
+                    (false, _) => u,
+                    (true, true) => 0.1 * u,
+                    (true, false) => 0.1 + 0.2 * u,
+                };
+                let [first, second] = densities(x);
+                let c = of_first.p_first();
+                let record = GuideRecord {
+                    p: Vec3::ZERO,
+                    d: Vec3::Z,
+                    radiance: 1.0,
+                    direct: 0.0,
+                    scattered: scale * mixture(ideal, x) / mixture(used, x),
+                    pdf: 1.0,
+                    pdf_bsdf: 1.0,
+                    pdf_guide: c * first + (1.0 - c) * second,
+                    pdf_sets: [first, second],
+                    kind: RecordKind::Mixed,
+                    primary: false,
+                };
+                let p_guide = of_guide.p_guide();
+                of_guide.step(&record);
+                of_first.step_sets(&record, p_guide);
+            }
+        }
+        [of_guide.p_guide(), of_first.p_first()]
+    }
+
+    #[test]
+    fn the_ideal_part_of_each_set_is_found_at_any_scale() {
+        for ideal in [[0.7, 0.2], [0.7, 0.8], [0.4, 0.5], [0.5, 0.9]] {
+            for scale in [1e-12, 1.0, 1e8] {
+                let found = learn_sets(ideal, scale, 80);
+                let far = found.iter().zip(ideal).any(|(found, ideal)| (found - ideal).abs() > 0.08);
+                assert!(!far, "{ideal:?} at {scale}: {found:?}");
+            }
+        }
+    }
+
+    /// Nothing is learnt about sets of which there is one, or from a delta lobe; extremes leave a probability.
+    #[test]
+    fn the_part_of_a_set_stays_where_nothing_tells_of_it() {
+        let record = GuideRecord {
+            p: Vec3::ZERO,
+            d: Vec3::Z,
+            radiance: 1.0,
+            direct: 1.0,
+            scattered: 1.0,
+            pdf: 0.5,
+            pdf_bsdf: 1.0,
+            pdf_guide: 0.5,
+            pdf_sets: [0.5; 2],
+            kind: RecordKind::Mixed,
+            primary: false,
+        };
+        let mut mixing = Mixing::default();
+        mixing.step_sets(&record, 0.5);
+        mixing.step_sets(&GuideRecord { kind: RecordKind::Delta, pdf_sets: [0.0, 1.0], ..record }, 0.5);
+        assert_eq!(mixing, Mixing::default());
+        for scattered in [f32::MAX, 1e-38, 0.0, 1.0] {
+            for pdf_sets in [[0.0, 1.0], [f32::MAX, 0.0], [f32::INFINITY, 1.0], [1e-38, 0.0]] {
+                mixing.step_sets(&GuideRecord { scattered, pdf_bsdf: 0.0, pdf_sets, ..record }, 0.95);
+                assert!(mixing.theta.is_finite() && (LIMITS.0..=LIMITS.1).contains(&mixing.p_first()));
+            }
+        }
+    }
+
     #[test]
     fn hc_p07_delta_lobes_draw_towards_the_bsdf_but_not_all_the_way() {
         let mut mixing = Mixing::default();
@@ -168,11 +275,14 @@ mod tests {
             p: Vec3::ZERO,
             d: Vec3::Z,
             radiance: 1.0,
+            direct: 0.0,
             scattered: 1.0,
             pdf: 0.5,
             pdf_bsdf: 1.0,
             pdf_guide: 0.0,
+            pdf_sets: [0.0; 2],
             kind: RecordKind::Delta,
+            primary: false,
         };
         for _ in 0..10_000 {
             mixing.step(&record);

@@ -19,6 +19,7 @@
 //! | `p_guide` | float | unset | probability of the guide, limited to 0.95; learnt if unset |
 //! | `product` | string | cosine | what the guide follows: `none`, the light alone; `cosine`, its product with the cosine, for BSDFs that reflect only; `resampling`, its product with any BSDF, by a choice among candidates |
 //! | `candidates` | integer | 2 | for `resampling`: directions drawn at a vertex, of which one is followed |
+//! | `sets` | string | one | sets of directions in each cell of space: `one`; `direct_indirect`, one for light of emitters that a scattered ray runs into and one for all other light, whose mixture is learnt; `primary_product`, one for what first hits scatter towards the camera (light times BSDF times cosine) and one for light that arrives at later vertices |
 //! | `roughness_threshold` | float | 0.05 | narrower lobes than this are not guided |
 //! | `nee` | string | always | when lights are sampled: `never`, `kickstart` (the first 128 samples per pixel), `always` |
 //! | `direct` | boolean | true | light that emitter sampling also finds is learnt, times the weight of finding it by scattering |
@@ -56,13 +57,17 @@ mod kept;
 mod learner;
 mod mixing;
 mod outlook;
+mod pair;
 mod prior;
 mod quadtree;
+mod sets;
 mod spatial;
 mod sums;
 
 use learner::Learner;
-use lucerna_core::interfaces::{Combination, EmitterSampling, Ending, Guide, GuideLearner, MOST_GUIDED, Training};
+use lucerna_core::interfaces::{
+    Combination, EmitterSampling, Ending, Guide, GuideLearner, GuideSets, MOST_GUIDED, Training,
+};
 use lucerna_core::io::Result;
 use lucerna_core::math::Aabb;
 use lucerna_core::scene::{Built, Constructor, Param, Plugin, Properties};
@@ -91,6 +96,7 @@ pub const PLUGIN: Plugin = Plugin {
         ),
         Param::int("candidates", 2, "directions of which one is chosen, if the product is by resampling")
             .range(1.0, 64.0),
+        Param::choice("sets", &["one", "direct_indirect", "primary_product"], "one", "sets of directions in each cell"),
         Param::float("roughness_threshold", 0.05, "narrower lobes are not guided").range(0.0, 1.0),
         Param::choice("nee", &["never", "kickstart", "always"], "always", "when lights are sampled"),
         Param::bool("direct", true, "learns light that emitter sampling also finds, by its weight"),
@@ -137,6 +143,10 @@ struct Settings {
     p_guide: Option<f32>,
     cosine: bool,
     max_bytes: usize,
+    /// What each cell keeps apart.
+    sets: GuideSets,
+    /// Whether that was asked for; else what begins with a file goes on with what it has.
+    sets_asked: bool,
     /// Whether directions are learnt; else only what scattering brings.
     directions: bool,
 }
@@ -161,6 +171,12 @@ fn build(p: &Properties<'_>) -> Built<dyn Guide> {
         p_guide: p.float_opt("p_guide").map(|p| p.min(MOST_GUIDED)),
         cosine: p.choice("product") != "none",
         max_bytes: (p.double("max_memory") * f64::from(1 << 20)) as usize,
+        sets: match p.choice("sets") {
+            "direct_indirect" => GuideSets::DirectIndirect,
+            "primary_product" => GuideSets::PrimaryProduct,
+            _ => GuideSets::One,
+        },
+        sets_asked: p.has("sets"),
         directions: true,
     };
     let training = Training {
@@ -207,6 +223,8 @@ pub(crate) fn outlook_alone() -> Arc<dyn Guide> {
         memory: 0.0,
         cosine: false,
         max_bytes: 64 << 20,
+        sets: GuideSets::One,
+        sets_asked: false,
         directions: false,
     };
     let training = Training {

@@ -152,9 +152,13 @@ pub enum FactValue {
 
 /// What has been learnt.
 pub trait GuideField: Send + Sync {
-    /// The directions learnt where a path is scattered; `None` where nothing is known. `one_sided` says that only the
-    /// side of `hit.wi` can be reached.
-    fn at<'g>(&'g self, hit: &SurfaceHit, one_sided: bool, arena: &'g Arena) -> Option<&'g dyn GuidedDirections>;
+    /// The directions learnt where a path is scattered; `None` where nothing is known.
+    fn at<'g>(&'g self, hit: &SurfaceHit, vertex: GuidedVertex, arena: &'g Arena) -> Option<&'g dyn GuidedDirections>;
+
+    /// Which sets of directions it has: what records must tell it.
+    fn sets(&self) -> GuideSets {
+        GuideSets::One
+    }
 
     /// The radiance that arrives at a point from world direction `d`, roughly; `None` where nothing is known.
     fn incident(&self, p: Vec3, d: Vec3) -> Option<f32>;
@@ -172,6 +176,27 @@ pub trait GuideField: Send + Sync {
     fn validate(&self) -> std::result::Result<(), String>;
 }
 
+/// The sets of directions that a field has at each place.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum GuideSets {
+    /// One, for all light and all vertices.
+    #[default]
+    One,
+    /// One for light of emitters that a scattered ray runs into, another for the rest. Directions come from their mixture.
+    DirectIndirect,
+    /// One for the light that first hits scatter towards the camera, another for the light that arrives at later vertices.
+    PrimaryProduct,
+}
+
+/// What a field is told about a vertex besides the hit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct GuidedVertex {
+    /// Only the side of `hit.wi` can be reached.
+    pub one_sided: bool,
+    /// The first vertex of a path from the camera.
+    pub primary: bool,
+}
+
 /// The directions learnt at a vertex.
 pub trait GuidedDirections {
     /// Probability of taking a direction from the guide instead of the BSDF, in [0, [`MOST_GUIDED`]].
@@ -182,6 +207,12 @@ pub trait GuidedDirections {
 
     /// Density of a world direction per solid angle: that of [`sample`](Self::sample).
     fn pdf(&self, d: Vec3) -> f32;
+
+    /// Densities of a world direction in the two sets of a field that has light met directly [apart](GuideSets), then in
+    /// that of the rest. Where there is one alone its density stands for both.
+    fn pdf_sets(&self, d: Vec3) -> [f32; 2] {
+        [self.pdf(d); 2]
+    }
 
     /// Light that arrives from a world direction, as a multiple of the mean over all that a diffuse surface would
     /// scatter, roughly.
@@ -206,6 +237,8 @@ pub struct GuideRecord {
     pub d: Vec3,
     /// Estimate of the radiance from there, mean of the channels; not negative.
     pub radiance: f32,
+    /// The part of `radiance` that the emitter gives which the ray ran into.
+    pub direct: f32,
     /// Estimate of the radiance that the vertex scattered, mean of the channels: radiance times the weight of the
     /// direction.
     pub scattered: f32,
@@ -215,8 +248,13 @@ pub struct GuideRecord {
     pub pdf_bsdf: f32,
     /// Density of the direction in the guide; 0 if there was none.
     pub pdf_guide: f32,
+    /// As [`GuidedDirections::pdf_sets`] gives them; 0 if there was no guide, or the field does not have light met directly
+    /// apart.
+    pub pdf_sets: [f32; 2],
     /// How the direction was found.
     pub kind: RecordKind,
+    /// The first vertex of a path from the camera.
+    pub primary: bool,
 }
 
 /// What one scattering at a vertex has brought: see [`Outlook`].

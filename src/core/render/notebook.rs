@@ -19,6 +19,10 @@ pub struct Scattering {
     pub pdf_bsdf: f32,
     /// As in [`GuideRecord`].
     pub pdf_guide: f32,
+    /// As in [`GuideRecord`].
+    pub pdf_sets: [f32; 2],
+    /// As in [`GuideRecord`].
+    pub primary: bool,
     /// How the direction was found; `None` where nothing can be learnt.
     pub kind: Option<RecordKind>,
 }
@@ -171,11 +175,24 @@ impl Notebook {
             && self.subjects.directions
         {
             let learnt = if self.learn_direct { arriving } else { (met_alone + beyond) * boost };
+            let direct = (if self.learn_direct { met } else { met_alone } * boost).mean();
             let scattered = (at.weight * learnt).mean();
             let radiance = learnt.mean();
             if radiance.is_finite() && scattered.is_finite() && at.pdf > 0.0 && at.pdf.is_finite() {
-                let Scattering { p, d, pdf, pdf_bsdf, pdf_guide, .. } = at;
-                self.records.push(GuideRecord { p, d, radiance, scattered, pdf, pdf_bsdf, pdf_guide, kind });
+                let Scattering { p, d, pdf, pdf_bsdf, pdf_guide, pdf_sets, primary, .. } = at;
+                self.records.push(GuideRecord {
+                    p,
+                    d,
+                    radiance,
+                    direct,
+                    scattered,
+                    pdf,
+                    pdf_bsdf,
+                    pdf_guide,
+                    pdf_sets,
+                    kind,
+                    primary,
+                });
             }
         }
         direct + at.weight * arriving
@@ -198,6 +215,8 @@ mod tests {
             pdf: 0.5,
             pdf_bsdf: 0.5,
             pdf_guide: 0.0,
+            pdf_sets: [0.0; 2],
+            primary: false,
             kind,
         }
     }

@@ -17,7 +17,7 @@ use super::standing::{Course, Part, Standing};
 use super::tiles::{Run, Tracer, asked_spp, points};
 use super::{Budget, Learnt, RenderContext, RenderError, Report, SampleOrder};
 use crate::interfaces::{
-    Arena, CameraRay, EmitterSampling, Ending, Goal, Guide, GuideField, Radiance, Subjects, Training,
+    Arena, CameraRay, EmitterSampling, Ending, Goal, Guide, GuideField, GuideSets, Radiance, Subjects, Training,
 };
 use crate::sampling::Stream;
 use crate::scene::Scene;
@@ -47,6 +47,8 @@ pub struct Guidance<'a> {
     pub learning: bool,
     /// What the run is to learn, and goes by.
     pub subjects: Subjects,
+    /// The sets of directions that the field has.
+    pub sets: GuideSets,
     /// What is known of the pixel.
     pub goal: Goal,
     /// Narrower lobes than this are not guided.
@@ -282,9 +284,9 @@ impl Lesson<'_, '_> {
             self.at.estimates.update(self.at.report.rays as f64 / self.at.report.samples as f64);
         }
         let (field, learner) = (self.at.learner.field(), &mut self.at.learner);
-        let goal = Goal::default();
+        let (sets, goal) = (field.sets(), Goal::default());
         let guidance =
-            Guidance { field: &*field, sample_emitters, learning, subjects, goal, least_roughness, candidates };
+            Guidance { field: &*field, sample_emitters, learning, subjects, sets, goal, least_roughness, candidates };
         let guided = Guided { estimator: self.estimator, guidance, learn_direct, estimates: &self.at.estimates };
         // Notes are taken in as they come, so that those of a few tiles at most are held. A pass that is lost
         // afterwards has taught something nevertheless.
