@@ -1,8 +1,9 @@
 //! What has been learnt, to be sampled.
 
 use super::cylinder;
+use super::near::Near;
 use super::outlook::{SIDES, side};
-use super::quadtree::{CELLS, EDGE, Quadtree, UNIFORM};
+use super::quadtree::{CELLS, EDGE, Quads, Quadtree, UNIFORM, long};
 use super::sets::{ApartLeaf, is_lit};
 use super::spatial::SpatialTree;
 use lucerna_core::interfaces::{Arena, GuideField, GuideSets, GuidedDirections, GuidedVertex, Outlook, SurfaceHit};
@@ -20,6 +21,8 @@ pub struct Field {
     pub sets: GuideSets,
     /// and that, as many as there are leaves; empty if not.
     pub apart: Vec<ApartLeaf>,
+    /// What vertices need of the leaves, if nothing is kept apart.
+    near: Near,
 }
 
 /// What is known in a cell of space.
@@ -37,13 +40,12 @@ pub struct Leaf {
 
 impl GuideField for Field {
     fn at<'g>(&'g self, hit: &SurfaceHit, vertex: GuidedVertex, arena: &'g Arena) -> Option<&'g dyn GuidedDirections> {
-        let index = self.tree.leaf(self.tree.cell(hit.p)).0 as usize;
-        let leaf = &self.leaves[index];
+        let index = self.tree.at(hit.p);
         if let Some(apart) = self.apart.get(index) {
-            return self.at_apart((leaf, apart), hit, vertex, arena);
+            return self.at_apart((&self.leaves[index], apart), hit, vertex, arena);
         }
-        let tree = leaf.directions.as_deref()?;
-        Some(arena.alloc(self.here(tree, leaf, hit, vertex.one_sided)?))
+        let (tree, p_guide) = self.near.get(index)?;
+        Some(arena.alloc(self.here(tree, p_guide, hit, vertex.one_sided)?))
     }
 
     fn sets(&self) -> GuideSets {
@@ -51,7 +53,7 @@ impl GuideField for Field {
     }
 
     fn incident(&self, p: Vec3, d: Vec3) -> Option<f32> {
-        let index = self.tree.leaf(self.tree.cell(p)).0 as usize;
+        let index = self.tree.at(p);
         let leaf = &self.leaves[index];
         // What is kept apart may be a part of the light; what first hits scatter is none.
         let apart = self.apart.get(index).filter(|_| self.sets == GuideSets::DirectIndirect);
@@ -59,8 +61,8 @@ impl GuideField for Field {
             return None;
         }
         let radiance = |tree: &Quadtree, fluence: f32| {
-            let (cell, density) = tree.pdf_in_cell(cylinder::of_direction(d));
-            fluence * UNIFORM * tree.grid[cell].get() * CELLS as f32 * density
+            let (cell, density) = tree.view().pdf_in_cell(cylinder::of_direction(d));
+            fluence * UNIFORM * tree.view().part(cell) * CELLS as f32 * density
         };
         let of_leaf = leaf.directions.as_deref().map_or(0.0, |tree| radiance(tree, leaf.fluence));
         let of_apart = apart.and_then(|apart| Some(radiance(apart.directions.as_deref()?, apart.fluence)));
@@ -68,7 +70,7 @@ impl GuideField for Field {
     }
 
     fn outlook(&self, p: Vec3, n: Vec3) -> Option<Outlook> {
-        self.leaves[self.tree.leaf(self.tree.cell(p)).0 as usize].outlooks[side(n)]
+        self.leaves[self.tree.at(p)].outlooks[side(n)]
     }
 
     fn validate(&self) -> Result<(), String> {
@@ -97,12 +99,18 @@ impl GuideField for Field {
 }
 
 impl Field {
+    /// What is known in the leaves of a tree over space.
+    pub fn new(tree: SpatialTree, leaves: Vec<Leaf>, cosine: bool, sets: GuideSets, apart: Vec<ApartLeaf>) -> Self {
+        let near = if apart.is_empty() { Near::new(&leaves) } else { Near::default() };
+        Field { tree, leaves, cosine, sets, apart, near }
+    }
+
     /// A tree of a leaf at a vertex.
     #[inline]
     pub(super) fn here<'g>(
         &self,
-        tree: &'g Quadtree,
-        leaf: &Leaf,
+        tree: Quads<'g>,
+        p_guide: f32,
         hit: &SurfaceHit,
         one_sided: bool,
     ) -> Option<Here<'g>> {
@@ -110,14 +118,14 @@ impl Field {
         // The integral of the factor over all directions.
         let (cosines, reach) =
             if self.cosine && one_sided { (cosines(normal), PI * f32::from(UPRIGHT)) } else { (&[1; CELLS], 4.0 * PI) };
-        Here::new(tree, leaf.p_guide, cosines, reach)
+        Here::new(tree, p_guide, cosines, reach)
     }
 }
 
 /// A leaf's directions at a vertex. Weights of cells are products that are made when they are needed: most vertices need
 /// few of them, but all need their sums.
 pub(super) struct Here<'g> {
-    tree: &'g Quadtree,
+    tree: Quads<'g>,
     /// Factors of the grid's cells.
     cosines: &'g [u8; CELLS],
     p_guide: f32,
@@ -133,18 +141,18 @@ pub(super) struct Here<'g> {
 
 impl<'g> Here<'g> {
     /// A tree that has the cosine in it.
-    pub(super) fn of_product(tree: &'g Quadtree, p_guide: f32) -> Option<Self> {
+    pub(super) fn of_product(tree: Quads<'g>, p_guide: f32) -> Option<Self> {
         Here::new(tree, p_guide, &[1; CELLS], 4.0 * PI)
     }
 
     /// `None` if no light comes from where it would be scattered.
     #[inline]
-    fn new(tree: &'g Quadtree, p_guide: f32, cosines: &'g [u8; CELLS], reach: f32) -> Option<Self> {
+    fn new(tree: Quads<'g>, p_guide: f32, cosines: &'g [u8; CELLS], reach: f32) -> Option<Self> {
         let mut columns = [0.0; EDGE];
-        let rows = tree.grid.as_chunks::<EDGE>().0.iter().zip(cosines.as_chunks::<EDGE>().0);
+        let rows = tree.grid().as_chunks::<EDGE>().0.iter().zip(cosines.as_chunks::<EDGE>().0);
         rows.for_each(|(grid, cosines)| {
             for i in 0..EDGE {
-                columns[i] += grid[i].get() * f32::from(cosines[i]);
+                columns[i] += long(grid[i]) * f32::from(cosines[i]);
             }
         });
         let total = sum(&columns);
@@ -155,8 +163,8 @@ impl<'g> Here<'g> {
 
 /// The weights of a column of the grid.
 #[inline]
-fn product(tree: &Quadtree, cosines: &[u8; CELLS], column: usize) -> [f32; EDGE] {
-    std::array::from_fn(|j| tree.grid[EDGE * j + column].get() * f32::from(cosines[EDGE * j + column]))
+fn product(tree: Quads<'_>, cosines: &[u8; CELLS], column: usize) -> [f32; EDGE] {
+    std::array::from_fn(|j| tree.part(EDGE * j + column) * f32::from(cosines[EDGE * j + column]))
 }
 
 /// The sum of eight numbers, always in the same order.
@@ -180,12 +188,12 @@ impl GuidedDirections for Here<'_> {
 
     fn pdf(&self, d: Vec3) -> f32 {
         let (cell, density) = self.tree.pdf_in_cell(cylinder::of_direction(d));
-        self.tree.grid[cell].get() * f32::from(self.cosines[cell]) * self.scale * density
+        self.tree.part(cell) * f32::from(self.cosines[cell]) * self.scale * density
     }
 
     fn light(&self, d: Vec3) -> f32 {
         let (cell, density) = self.tree.pdf_in_cell(cylinder::of_direction(d));
-        self.tree.grid[cell].get() * self.scale * density * self.reach
+        self.tree.part(cell) * self.scale * density * self.reach
     }
 }
 

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `u64`, `u32`, `u16`, `u16` | records taken in, iterations, whether the limit of memory was reached, sets of directions (0: one) |
 //! | | the tree over space: number of nodes, two children each |
-//! | `u32` | trees over directions, then each: parts of the flux in the grid, which of its cells are divided, number of nodes, four `u16` each |
+//! | `u32` | trees over directions, then each: number of quads, four `u16` each |
 //! | | cells of space, one more than nodes: which tree over directions (0: none), probability of the guide, fluence, records, the descent that learns the probability, shape of the sums, and the sums unless all are 0, what scattering brings |
 //! | | if there are two sets, what each cell keeps apart: which tree over directions, probability, fluence, records, descent, sums |
 //!
@@ -27,8 +27,8 @@ use lucerna_core::math::Aabb;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// Bytes of a tree over directions at least: the grid, which cells are divided, number of nodes.
-const LEAST_TREE: u64 = 64 * 2 + 8 + 4;
+/// Bytes of a tree over directions at least: number of quads, the grid, which of its cells are divided.
+const LEAST_TREE: u64 = 4 + 64 * 2 + 8;
 
 /// What a number means.
 const SETS: [GuideSets; 3] = [GuideSets::One, GuideSets::DirectIndirect, GuideSets::PrimaryProduct];
@@ -130,7 +130,7 @@ impl Learner {
             apart.push(Apart { sums, count, mixing, directions, fluence });
         }
         from.end()?;
-        let field = Arc::new(Field { tree: tree.clone(), leaves, cosine: settings.cosine, sets, apart: known });
+        let field = Arc::new(Field::new(tree.clone(), leaves, settings.cosine, sets, known));
         field.validate().map_err(IoError::new)?;
         Ok(Learner { settings, tree, cells, apart, field, taken, iterations, full })
     }

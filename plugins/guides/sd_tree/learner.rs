@@ -83,13 +83,13 @@ impl Learner {
         let tree = SpatialTree::new(bounds);
         let sets = settings.sets;
         let apart = vec![Apart::default(); usize::from(sets != GuideSets::One)];
-        let field = Arc::new(Field {
-            tree: tree.clone(),
-            leaves: vec![Leaf::default()],
-            cosine: settings.cosine,
+        let field = Arc::new(Field::new(
+            tree.clone(),
+            vec![Leaf::default()],
+            settings.cosine,
             sets,
-            apart: apart.iter().map(|apart| apart.leaf(&settings)).collect(),
-        });
+            apart.iter().map(|apart| apart.leaf(&settings)).collect(),
+        ));
         let cells = vec![Cell::default()];
         Learner { settings, tree, cells, apart, field, taken: 0, iterations: 0, full: false }
     }
@@ -155,7 +155,8 @@ impl Learner {
 
     /// Bytes of everything.
     pub(super) fn bytes(&self) -> usize {
-        let tree = |cell: &Cell| cell.directions.as_ref().map_or(0, |tree| tree.bytes());
+        // Once to keep and once to sample from.
+        let tree = |cell: &Cell| 2 * cell.directions.as_ref().map_or(0, |tree| tree.bytes());
         let cells =
             self.cells.iter().map(|cell| size_of::<Cell>() + size_of::<Leaf>() + cell.sums.bytes() + tree(cell));
         2 * self.tree.bytes() + cells.sum::<usize>() + self.apart.iter().map(Apart::bytes).sum::<usize>()
@@ -294,13 +295,13 @@ impl GuideLearner for Learner {
             outlooks: std::array::from_fn(|side| cell.outlooks[side].outlook()),
         };
         let leaves = self.cells.iter().map(leaf).collect();
-        self.field = Arc::new(Field {
-            tree: self.tree.clone(),
+        self.field = Arc::new(Field::new(
+            self.tree.clone(),
             leaves,
-            cosine: self.settings.cosine,
-            sets: self.settings.sets,
-            apart: self.apart_leaves(),
-        });
+            self.settings.cosine,
+            self.settings.sets,
+            self.apart_leaves(),
+        ));
         self.iterations += 1;
     }
 

@@ -56,6 +56,7 @@ mod field;
 mod kept;
 mod learner;
 mod mixing;
+mod near;
 mod outlook;
 mod pair;
 mod prior;

@@ -1,6 +1,7 @@
 //! Directions where something is kept [apart](super::sets).
 
 use super::field::{Field, Here, Leaf};
+use super::quadtree::Quadtree;
 use super::sets::ApartLeaf;
 use lucerna_core::interfaces::{Arena, GuideSets, GuidedDirections, GuidedVertex, SurfaceHit};
 use lucerna_core::math::{ONE_MINUS_EPSILON, Vec2, Vec3};
@@ -17,11 +18,16 @@ impl Field {
         if self.sets == GuideSets::PrimaryProduct {
             return match apart.directions.as_deref().filter(|_| vertex.primary) {
                 // The cosine is in it.
-                Some(tree) => Some(arena.alloc(Here::of_product(tree, apart.p)?)),
-                None => Some(arena.alloc(self.here(leaf.directions.as_deref()?, leaf, hit, vertex.one_sided)?)),
+                Some(tree) => Some(arena.alloc(Here::of_product(tree.view(), apart.p)?)),
+                None => Some(arena.alloc(self.here(
+                    leaf.directions.as_deref()?.view(),
+                    leaf.p_guide,
+                    hit,
+                    vertex.one_sided,
+                )?)),
             };
         }
-        let here = |tree| self.here(tree, leaf, hit, vertex.one_sided);
+        let here = |tree: &'g Quadtree| self.here(tree.view(), leaf.p_guide, hit, vertex.one_sided);
         let direct = apart.directions.as_deref().and_then(here);
         let rest = leaf.directions.as_deref().and_then(here);
         match (direct, rest) {

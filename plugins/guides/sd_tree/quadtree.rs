@@ -55,22 +55,16 @@ pub fn blend(part: f64, worth: f64, expected: f64, prior: f64) -> f64 {
     if worth > 0.0 { (worth * part + prior * expected) / (worth + prior) } else { expected }
 }
 
-/// The upper half of a float: three decimal digits.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Short(u16);
+/// The upper half of a float, rounded: three decimal digits.
+fn short(value: f32) -> u16 {
+    let bits = value.to_bits();
+    ((bits + 0x7fff + (bits >> 16 & 1)) >> 16) as u16
+}
 
-impl Short {
-    /// The nearest one.
-    fn of(value: f32) -> Self {
-        let bits = value.to_bits();
-        Short(((bits + 0x7fff + (bits >> 16 & 1)) >> 16) as u16)
-    }
-
-    /// As a float.
-    #[inline(always)]
-    pub fn get(self) -> f32 {
-        f32::from_bits(u32::from(self.0) << 16)
-    }
+/// The float of which this is the upper half.
+#[inline(always)]
+pub fn long(short: u16) -> f32 {
+    f32::from_bits(u32::from(short) << 16)
 }
 
 /// A cell that is divided into four.
@@ -124,57 +118,68 @@ fn share(part: f64, whole: f64) -> u16 {
     }
 }
 
-/// A tree to sample from.
+/// A tree to sample from: the grid (16 quads), a bit for each of its cells that is divided (one), and the nodes, those of
+/// the divided cells first.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Quadtree {
-    /// Part of the flux in each cell; they sum to 1, but for rounding.
-    pub grid: [Short; CELLS],
-    /// A bit for each cell that is divided. Their nodes come first, in this order.
-    divided: u64,
-    nodes: Vec<Node>,
-}
+pub struct Quadtree(Vec<Quad>);
 
-impl Quadtree {
-    /// With these parts of the flux in the cells of the grid, and inside them as was summed. Where that was found by few
-    /// records, what they say counts less than a uniform distribution, which is worth `prior` records.
-    pub fn new(grid: [f32; CELLS], sums: &Sums, prior: f64) -> Self {
-        let roots = || sums.roots.iter().enumerate().filter(|(_, root)| **root != 0);
-        let divided = roots().fold(0, |bits, (cell, _)| bits | 1 << cell);
-        // Nodes of the sums in the order of the nodes here: all of a level, then those below.
-        let mut open: Vec<u16> = roots().map(|(_, root)| *root).collect();
-        let mut nodes = Vec::new();
-        while let Some(node) = open.get(nodes.len()).copied() {
-            let (parts, below) = sums.parts(node);
-            let total = parts.iter().fold(Found::default(), |total, part| total.and(*part));
-            let worth = total.worth();
-            let [a, b, c, d] = parts.map(|part| blend(part.flux / total.flux, worth, 0.25, prior));
-            let mut bits = (open.len() as u16) << 4;
-            for (child, node) in below.iter().enumerate().filter(|(_, node)| **node != 0) {
-                bits |= 1 << child;
-                open.push(*node);
-            }
-            let (lower, left) = (share(a + b, a + b + c + d), [share(a, a + b), share(c, c + d)]);
-            nodes.push(Node { lower, left, below: if bits & 0xf == 0 { 0 } else { bits } });
-        }
-        Quadtree { grid: grid.map(Short::of), divided, nodes }
+/// Four numbers of 16 bits.
+pub type Quad = [u16; 4];
+
+/// A [`Quadtree`], wherever it lies. What stands behind it does not matter.
+#[derive(Clone, Copy)]
+pub struct Quads<'a>(&'a [Quad]);
+
+/// Quads of the grid.
+const GRID_QUADS: usize = CELLS / 4;
+
+impl<'a> Quads<'a> {
+    /// The tree that begins there.
+    #[inline]
+    pub fn new(quads: &'a [Quad]) -> Option<Self> {
+        (quads.len() > GRID_QUADS).then_some(Quads(quads))
+    }
+
+    /// Part of the flux in each cell of the grid; they sum to 1, but for rounding.
+    #[inline]
+    pub fn grid(self) -> &'a [u16; CELLS] {
+        self.0.as_flattened().first_chunk().unwrap_or(&[0; CELLS])
+    }
+
+    /// Part of the flux in a cell of the grid.
+    #[inline]
+    pub fn part(self, cell: usize) -> f32 {
+        long(self.grid()[cell])
+    }
+
+    #[inline]
+    fn divided(self) -> u64 {
+        self.0[GRID_QUADS].iter().rev().fold(0, |bits, part| bits << 16 | u64::from(*part))
+    }
+
+    #[inline]
+    fn node(self, index: usize) -> Node {
+        let [lower, a, b, below] = self.0[GRID_QUADS + 1 + index];
+        Node { lower, left: [a, b], below }
     }
 
     /// The node of a cell of the grid.
     #[inline]
-    fn root(&self, cell: usize) -> Option<usize> {
-        let before = self.divided & ((1 << cell) - 1);
-        (self.divided >> cell & 1 == 1).then(|| before.count_ones() as usize)
+    fn root(self, cell: usize) -> Option<usize> {
+        let divided = self.divided();
+        let before = divided & ((1 << cell) - 1);
+        (divided >> cell & 1 == 1).then(|| before.count_ones() as usize)
     }
 
     /// The cell of a point, and its density relative to a uniform one inside this cell.
     #[inline]
-    pub fn pdf_in_cell(&self, mut p: Vec2) -> (usize, f32) {
+    pub fn pdf_in_cell(self, mut p: Vec2) -> (usize, f32) {
         let cell = cell(&mut p);
         let mut below = self.root(cell);
         let mut density = 1.0;
         while let Some(node) = below {
             let child = descend(&mut p);
-            let node = self.nodes[node];
+            let node = self.node(node);
             density *= node.density(child);
             below = node.child(child);
         }
@@ -184,14 +189,14 @@ impl Quadtree {
     /// A point of a cell in the whole square, and its density relative to a uniform one inside this cell. Both numbers
     /// are used again on every level; double precision keeps what they have.
     #[inline]
-    pub fn sample_in_cell(&self, cell: usize, u: [f64; 2]) -> (Vec2, f32) {
+    pub fn sample_in_cell(self, cell: usize, u: [f64; 2]) -> (Vec2, f32) {
         let [mut x, mut y] = u;
         let mut low = [(cell % EDGE) as f64, (cell / EDGE) as f64].map(|i| i / EDGE as f64);
         let mut size = 1.0 / EDGE as f64;
         let mut below = self.root(cell);
         let mut density = 1.0;
         while let Some(node) = below {
-            let node = self.nodes[node];
+            let node = self.node(node);
             size *= 0.5;
             let (j, rest) = choose(y, node.lower);
             let (i, rest_x) = choose(x, node.left[j]);
@@ -203,15 +208,52 @@ impl Quadtree {
         let p = Vec2::new((low[0] + size * x) as f32, (low[1] + size * y) as f32);
         (p.min(Vec2::splat(ONE_MINUS_EPSILON)), density)
     }
+}
+
+impl Quadtree {
+    /// With these parts of the flux in the cells of the grid, and inside them as was summed. Where that was found by few
+    /// records, what they say counts less than a uniform distribution, which is worth `prior` records.
+    pub fn new(grid: [f32; CELLS], sums: &Sums, prior: f64) -> Self {
+        let mut quads = grid.map(short).as_chunks().0.to_vec();
+        let roots = || sums.roots.iter().enumerate().filter(|(_, root)| **root != 0);
+        let divided = roots().fold(0u64, |bits, (cell, _)| bits | 1 << cell);
+        quads.push([0, 16, 32, 48].map(|shift| (divided >> shift) as u16));
+        // Nodes of the sums in the order of the nodes here: all of a level, then those below.
+        let mut open: Vec<u16> = roots().map(|(_, root)| *root).collect();
+        let mut done = 0;
+        while let Some(node) = open.get(done).copied() {
+            done += 1;
+            let (parts, below) = sums.parts(node);
+            let total = parts.iter().fold(Found::default(), |total, part| total.and(*part));
+            let worth = total.worth();
+            let [a, b, c, d] = parts.map(|part| blend(part.flux / total.flux, worth, 0.25, prior));
+            let first = (open.len() as u16) << 4;
+            let mut bits = 0;
+            for (child, node) in below.iter().enumerate().filter(|(_, node)| **node != 0) {
+                bits |= 1 << child;
+                open.push(*node);
+            }
+            let below = if bits == 0 { 0 } else { first | bits };
+            quads.push([share(a + b, a + b + c + d), share(a, a + b), share(c, c + d), below]);
+        }
+        Quadtree(quads)
+    }
+
+    /// To sample from.
+    #[inline]
+    pub fn view(&self) -> Quads<'_> {
+        Quads(&self.0)
+    }
+
+    /// All of it.
+    pub fn quads(&self) -> &[Quad] {
+        &self.0
+    }
 
     /// Writes it.
     pub fn pack(&self, to: &mut Packer) {
-        self.grid.iter().for_each(|part| to.u16(part.0));
-        to.u64(self.divided);
-        to.u32(self.nodes.len() as u32);
-        for Node { lower, left: [a, b], below } in &self.nodes {
-            [lower, a, b, below].into_iter().for_each(|bits| to.u16(*bits));
-        }
+        to.u32(self.0.len() as u32);
+        self.0.as_flattened().iter().for_each(|part| to.u16(*part));
     }
 
     /// Reads what was written.
@@ -220,25 +262,23 @@ impl Quadtree {
     /// If it is no tree of probabilities.
     pub fn unpack(from: &mut Cursor<'_>) -> Result<Self> {
         const WHAT: &str = "a tree over directions";
-        let mut grid = [Short::default(); CELLS];
-        for part in &mut grid {
-            *part = Short(from.u16(WHAT)?);
+        let mut quads = vec![Quad::default(); from.count(size_of::<Quad>() as u64, WHAT)?];
+        for part in quads.as_flattened_mut() {
+            *part = from.u16(WHAT)?;
         }
-        let divided = from.u64(WHAT)?;
-        let mut nodes = vec![Node::default(); from.count(size_of::<Node>() as u64, "nodes of directions")?];
-        for node in &mut nodes {
-            let (lower, left) = (from.u16(WHAT)?, [from.u16(WHAT)?, from.u16(WHAT)?]);
-            *node = Node { lower, left, below: from.u16(WHAT)? };
-        }
-        let tree = Quadtree { grid, divided, nodes };
+        let tree = Quadtree(quads);
         tree.validate().map_err(IoError::new)?;
         Ok(tree)
     }
 
+    fn each_node(&self) -> impl Iterator<Item = Node> {
+        (0..self.nodes()).map(|index| self.view().node(index))
+    }
+
     /// The level of the cell that each node divides.
     fn levels(&self) -> Vec<u32> {
-        let mut levels = vec![GRID_LEVEL; self.divided.count_ones() as usize];
-        for (index, node) in self.nodes.iter().enumerate() {
+        let mut levels = vec![GRID_LEVEL; self.view().divided().count_ones() as usize];
+        for (index, node) in self.each_node().enumerate() {
             let level = levels.get(index).map_or(GRID_LEVEL, |level| level + 1);
             levels.extend(std::iter::repeat_n(level, node.divided()));
         }
@@ -247,20 +287,20 @@ impl Quadtree {
 
     /// Leaves at each level below the square, which is level 0.
     pub fn leaves_per_level(&self, counts: &mut [u64; MOST_LEVELS as usize + 1]) {
-        counts[GRID_LEVEL as usize] += u64::from(self.divided.count_zeros());
-        for (node, level) in self.nodes.iter().zip(self.levels()) {
+        counts[GRID_LEVEL as usize] += u64::from(self.view().divided().count_zeros());
+        for (node, level) in self.each_node().zip(self.levels()) {
             counts[level as usize + 1] += 4 - node.divided() as u64;
         }
     }
 
     /// Nodes below the grid.
     pub fn nodes(&self) -> usize {
-        self.nodes.len()
+        self.0.len().saturating_sub(GRID_QUADS + 1)
     }
 
     /// Bytes it takes.
     pub fn bytes(&self) -> usize {
-        size_of::<Self>() + self.nodes.len() * size_of::<Node>()
+        size_of::<Self>() + self.0.len() * size_of::<Quad>()
     }
 
     /// Checks that all parts are probabilities and sum to one, and that every node is reached once.
@@ -268,19 +308,20 @@ impl Quadtree {
     /// # Errors
     /// What does not hold.
     pub fn validate(&self) -> std::result::Result<(), String> {
-        let parts = || self.grid.iter().map(|part| part.get());
+        let Some(view) = Quads::new(&self.0) else { return Err("a quadtree has no grid".to_owned()) };
+        let parts = || view.grid().iter().map(|part| long(*part));
         if !(parts().all(|part| part >= 0.0) && (parts().sum::<f32>() - 1.0).abs() < 0.01) {
             return Err("the grid of a quadtree does not sum to 1".to_owned());
         }
-        let mut reached = self.divided.count_ones() as usize;
-        for (index, node) in self.nodes.iter().enumerate() {
+        let mut reached = view.divided().count_ones() as usize;
+        for (index, node) in self.each_node().enumerate() {
             let first = usize::from(node.below >> 4);
             if index >= reached || (node.divided() > 0 && first != reached) || reached > MOST_NODES {
                 return Err("a node of a quadtree is not reached exactly once".to_owned());
             }
             reached += node.divided();
         }
-        if reached != self.nodes.len() {
+        if reached != self.nodes() {
             return Err("a quadtree refers to nodes that it does not have".to_owned());
         }
         match self.levels().iter().all(|level| *level < MOST_LEVELS) {
@@ -356,14 +397,14 @@ mod tests {
         let tree = tree(&trained(false));
         tree.validate().unwrap();
         assert!(tree.nodes() > 20 && tree.nodes() < 600, "{}", tree.nodes());
-        let (_, peak) = tree.pdf_in_cell(Vec2::new(0.3005, 0.9995));
+        let (_, peak) = tree.view().pdf_in_cell(Vec2::new(0.3005, 0.9995));
         assert!(peak > 1000.0, "{peak}");
     }
 
     #[test]
     fn hc_p02_sums_of_nothing_one_and_extremes_are_usable() {
         let uniform = Quadtree::new([1.0 / CELLS as f32; CELLS], &Sums::default(), 8.0);
-        assert_eq!(uniform.pdf_in_cell(Vec2::splat(0.3)).1, 1.0);
+        assert_eq!(uniform.view().pdf_in_cell(Vec2::splat(0.3)).1, 1.0);
         assert_eq!(Sums::default().refined(HOW), Sums::default());
         for value in [1e30, 1e-30, 1.0] {
             let mut sums = Sums::default();
@@ -371,7 +412,7 @@ mod tests {
                 sums.add(Vec2::new(0.2, 0.7), value);
                 let tree = tree(&sums);
                 tree.validate().unwrap();
-                assert!(tree.pdf_in_cell(Vec2::new(0.2, 0.7)).1.is_finite());
+                assert!(tree.view().pdf_in_cell(Vec2::new(0.2, 0.7)).1.is_finite());
                 let mut next = sums.refined(HOW);
                 next.add_box(Vec2::new(0.2, 0.7), value);
                 self::tree(&next).validate().unwrap();
@@ -413,8 +454,8 @@ mod tests {
         let mut pcg = Pcg32::new(1, 1);
         for _ in 0..20_000 {
             let from = (pcg.next_below(CELLS as u32)) as usize;
-            let (p, density) = tree.sample_in_cell(from, [pcg.next_f32(), pcg.next_f32()].map(f64::from));
-            let (cell, expected) = tree.pdf_in_cell(p);
+            let (p, density) = tree.view().sample_in_cell(from, [pcg.next_f32(), pcg.next_f32()].map(f64::from));
+            let (cell, expected) = tree.view().pdf_in_cell(p);
             assert!(cell == from && (density / expected - 1.0).abs() < 1e-5, "{p}: {density} {expected}");
         }
     }

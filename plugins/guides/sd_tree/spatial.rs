@@ -15,7 +15,7 @@ const BITS: u32 = 20;
 pub const DEEPEST: u32 = 3 * BITS;
 
 /// Bits of each coordinate by which a search begins: what is above that many levels is looked up.
-const TOP_BITS: u32 = 3;
+const TOP_BITS: u32 = 4;
 
 /// Splits that one look-up goes down.
 const TOP: u32 = 3 * TOP_BITS;
@@ -29,9 +29,10 @@ pub struct SpatialTree {
     root: u32,
     nodes: Vec<[u32; 2]>,
     leaves: u32,
-    /// Where the search goes on for each cell of a grid of 8 × 8 × 8, and how many splits are above: nine, or as many
-    /// as the leaf has.
-    top: Vec<(u32, u32)>,
+    /// Where the search goes on for each cell of a grid of 16 × 16 × 16,
+    top: Vec<u32>,
+    /// and how many splits are above: twelve, or as many as the leaf has.
+    above: Vec<u8>,
 }
 
 /// One half of a cell.
@@ -52,8 +53,8 @@ impl SpatialTree {
         let extent = (bounds.max - bounds.min).max_element();
         let usable = bounds.is_finite() && !bounds.is_empty() && extent > 0.0 && (1.0 / extent).is_finite();
         let (min, scale) = if usable { (bounds.min, 1.0 / extent) } else { (Vec3::ZERO, 1.0) };
-        let top = vec![(LEAF, 0); 1 << TOP];
-        SpatialTree { min, scale, root: LEAF, nodes: Vec::new(), leaves: 1, top }
+        let (top, above) = (vec![LEAF; 1 << TOP], vec![0; 1 << TOP]);
+        SpatialTree { min, scale, root: LEAF, nodes: Vec::new(), leaves: 1, top, above }
     }
 
     /// Writes it; bounds are not part of it.
@@ -112,11 +113,31 @@ impl SpatialTree {
     /// The leaf at a position, and how many splits are above it.
     #[inline]
     pub fn leaf(&self, cell: Cell) -> (u32, u32) {
-        let [x, y, z] = cell.map(|x| (x >> (BITS - TOP_BITS)) as usize);
-        let (node, depth) = self.top[(((z << TOP_BITS) + y) << TOP_BITS) + x];
-        // Where the table ends in the tree, nine splits are above, three of each coordinate.
+        let top = Self::top(cell);
+        // Where the table ends in the tree, twelve splits are above, four of each coordinate.
+        let (node, depth) = (self.top[top], u32::from(self.above[top]));
         let (leaf, depth) = self.search(node, depth, None, cell.map(|x| x << (32 - BITS + TOP_BITS)));
         (leaf & !LEAF, depth)
+    }
+
+    /// The leaf in which a point lies.
+    #[inline]
+    pub fn at(&self, p: Vec3) -> usize {
+        let cell = self.cell(p);
+        let [mut a, mut b, mut c] = cell.map(|x| x << (32 - BITS + TOP_BITS));
+        let mut node = self.top[Self::top(cell)];
+        while node & LEAF == 0 {
+            node = self.nodes[node as usize][(a >> 31) as usize];
+            (a, b, c) = (b, c, a << 1);
+        }
+        (node & !LEAF) as usize
+    }
+
+    /// Where the table tells of a position.
+    #[inline]
+    fn top(cell: Cell) -> usize {
+        let [x, y, z] = cell.map(|x| (x >> (BITS - TOP_BITS)) as usize);
+        (((z << TOP_BITS) + y) << TOP_BITS) + x
     }
 
     /// The leaf at or below a node with so many splits above, or the node where that many `most` are reached. The bits
@@ -136,7 +157,8 @@ impl SpatialTree {
         for index in 0..1 << TOP {
             let coordinate = |axis: u32| (index >> (axis * TOP_BITS)) as u32 & ((1 << TOP_BITS) - 1);
             let cell = [0, 1, 2].map(|axis| coordinate(axis) << (32 - TOP_BITS));
-            self.top[index] = self.search(self.root, 0, Some(TOP), cell);
+            let (node, depth) = self.search(self.root, 0, Some(TOP), cell);
+            (self.top[index], self.above[index]) = (node, depth as u8);
         }
     }
 
@@ -239,7 +261,7 @@ impl SpatialTree {
 
     /// Bytes it takes.
     pub fn bytes(&self) -> usize {
-        self.nodes.len() * size_of::<[u32; 2]>() + self.top.len() * size_of::<(u32, u32)>()
+        self.nodes.len() * size_of::<[u32; 2]>() + self.top.len() * (size_of::<u32>() + size_of::<u8>())
     }
 
     /// Checks that every leaf is there once and every node is reached.
