@@ -7,8 +7,8 @@
 //!
 //! The text leaves open how c is learnt. Here it follows the divergence of the whole mixture, of both sets and the BSDF, just
 //! as the probability of the BSDF does: both go towards what is ideal together. It begins at the part of the flux, with which
-//! both sets are what one would be, instead of at one half: where little light is met directly, that costs much at first. Light through surfaces that let rays straight
-//! through is not met directly: emitter sampling cannot see it either.
+//! both sets are what one would be, instead of at one half: where little light is met directly, that costs much at first.
+//! Light through surfaces that let rays straight through is not met directly: emitter sampling cannot see it either.
 
 use super::Settings;
 use super::field::Leaf;
