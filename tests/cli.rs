@@ -381,6 +381,67 @@ fn hc_i22_files_of_learnt_state_that_are_of_no_use_are_told() {
     assert!(run.code == 2 && run.stderr.contains("is of another scene: its bounds are ["), "{}", run.stderr);
 }
 
+/// A scene that names the file does what the options do; it is beside the scene, and the options stand before it.
+#[test]
+fn a_scene_names_the_file_of_its_guide() {
+    let scene = |name: &str, more: &str| {
+        let guide = format!(
+            "<integrator type='path'><guide type='sd_tree'><float name='spatial_threshold' value='100'/>{more}</guide></integrator>"
+        );
+        let path = temporary("scene_guide", name);
+        let text = include_str!("guiding/gap.xml").replace("<!-- integrator -->", &guide);
+        std::fs::write(&path, text).expect("written");
+        path
+    };
+    let plain = scene("plain.xml", "");
+    let keeps = scene("keeps.xml", "<string name='file' value='box.guide'/>");
+    let frozen = scene("frozen.xml", "<string name='file' value='box.guide'/><boolean name='frozen' value='true'/>");
+    let learnt = temporary("scene_guide", "box.guide");
+    let options = temporary("scene_guide", "options.guide");
+    let output = temporary("scene_guide", "picture.exr");
+    let picture = |scene: &Path, more: &[&str]| {
+        done(&[&["render", "-q", "--spp", "24", "-o", text(&output), text(scene)], more].concat());
+        exr::read(&output, &ReadLimits::default()).expect("a valid EXR file").image.data
+    };
+    let bytes = |path: &Path| std::fs::read(path).expect("a file");
+    let without = picture(&plain, &[]);
+    assert!(
+        picture(&keeps, &["--guide-file", text(&options)]) == without && !learnt.exists(),
+        "options stand before it"
+    );
+    assert_eq!(picture(&keeps, &[]), without);
+    assert_eq!(bytes(&learnt), bytes(&options));
+    let with = picture(&frozen, &[]);
+    assert!(with != without && with == picture(&plain, &["--guide-file", text(&options), "--guide-frozen"]));
+    assert_eq!(bytes(&learnt), bytes(&options), "a frozen file was written");
+    // Only `render` writes it.
+    std::fs::remove_file(&learnt).expect("it was there");
+    done(&[
+        "compare",
+        text(&keeps),
+        "-m",
+        "scene",
+        "--spp",
+        "8",
+        "--seeds",
+        "2",
+        "-o",
+        text(&folder_of("cli", "scene_guide").join("compared")),
+    ]);
+    assert!(!learnt.exists());
+
+    let told = |scene: &Path, place: &str, expected: &str| {
+        let run = lucerna(&["render", "-q", "-o", text(&output), text(scene)]);
+        let place = format!("{}:{place}", text(scene));
+        assert!(run.code == 2 && run.stderr.contains(&place) && run.stderr.contains(expected), "{}", run.stderr);
+    };
+    told(&frozen, "3:", "could not open the file \"box.guide\"");
+    std::fs::write(&learnt, b"PNG or so").expect("written");
+    told(&keeps, "3:", "is not a file of what a guide has learnt");
+    told(&scene("alone.xml", "<boolean name='frozen' value='true'/>"), "3:", "\"frozen\" needs a \"file\"");
+    told(&scene("nowhere.xml", "<string name='file' value='no/such.guide'/>"), "3:", "its folder does not exist");
+}
+
 /// The same command goes on from where a run stood, here at its end; another command is refused. (What is interrupted
 /// elsewhere: `tests/determinism.rs`, `tests/guiding/kept.rs`.)
 #[test]

@@ -43,6 +43,7 @@ impl Integrator for Slow {
             store: FilmStore::new(cx.store.size(), Vec::new()),
             checkpoint: None,
             guide_file: None,
+            leaves_learnt: false,
         };
         self.0.render(&mut again)?;
         Ok(report)

@@ -41,17 +41,19 @@ pub const PLUGIN: Plugin = Plugin {
     aliases: &[],
     summary: "paths end or split by what they are expected to bring",
     params: &[&[
-        Param::float("window", 3.0, "largest weight that neither ends nor splits, over the smallest").at_least(1.0)
+        Param::float("window", 3.0, "largest weight that neither ends nor splits, over the smallest").at_least(1.0),
+        Param::float("least", 0.05, "probability with which a path goes on at least").range(0.05, 1.0),
     ]],
     build: Constructor::Roulette(build),
 };
 
 fn build(p: &Properties<'_>) -> Built<dyn Roulette> {
-    Ok(Arc::new(Adjoint { window: p.float("window") }))
+    Ok(Arc::new(Adjoint { window: p.float("window"), least: p.float("least") }))
 }
 
 struct Adjoint {
     window: f32,
+    least: f32,
 }
 
 impl Roulette for Adjoint {
@@ -68,7 +70,7 @@ impl Roulette for Adjoint {
         }
         let low = 2.0 / (1.0 + self.window);
         let high = self.window * low;
-        limited(path, if weight < low { weight / low } else { (weight / high).max(1.0) })
+        limited(path, if weight < low { (weight / low).max(self.least) } else { (weight / high).max(1.0) })
     }
 
     fn survival(&self, path: &PathState, delta: bool) -> f32 {

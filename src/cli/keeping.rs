@@ -6,8 +6,8 @@ use clap::Args;
 use lucerna_core::interfaces::FilmSettings;
 use lucerna_core::io::output::check_replaceable;
 use lucerna_core::render::{Budget, Checkpoint, GuideFile, RenderContext};
-use lucerna_core::scene::Description;
 use lucerna_core::scene::write::{WriteOptions, to_xml};
+use lucerna_core::scene::{Description, ObjectKind};
 use std::path::PathBuf;
 
 /// Options of `render`.
@@ -47,6 +47,15 @@ impl KeepingArguments {
         self.checkpoint.is_some()
     }
 
+    /// A guide's file named here stands for one that the scene names.
+    pub fn override_scene(&self, description: &mut Description) {
+        let guides = description.nodes.iter_mut().filter(|node| node.kind == ObjectKind::Guide);
+        for guide in guides.filter(|_| self.guide_file.is_some()) {
+            guide.take("file");
+            guide.take("frozen");
+        }
+    }
+
     /// Checks that files can be written.
     ///
     /// # Errors
@@ -60,6 +69,7 @@ impl KeepingArguments {
 
     /// Tells a context where to keep what. `scene` is the hash of the scene as it is rendered.
     pub fn apply(&self, cx: &mut RenderContext<'_>, scene: &str, chosen: &Chosen<'_>) {
+        cx.leaves_learnt = true;
         cx.guide_file = self.guide_file.clone().map(|path| GuideFile { path, frozen: self.guide_frozen });
         let samples = match cx.budget {
             Budget::Samples(spp) => spp.to_string(),

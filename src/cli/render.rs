@@ -169,6 +169,7 @@ pub fn run(registry: &Registry, arguments: &Arguments) -> Result<ExitCode, Failu
         let node = short_form::parse(ObjectKind::Roulette, text, "--roulette").map_err(Failure::new)?;
         short_form::decide(&mut description, registry, &node).map_err(Failure::new)?;
     }
+    arguments.keeping.override_scene(&mut description);
     if let Some(size) = arguments.size {
         description.resize_films(size, "--size");
     }

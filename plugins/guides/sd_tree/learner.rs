@@ -82,15 +82,15 @@ impl Learner {
     pub fn new(settings: Settings, bounds: Aabb) -> Self {
         let tree = SpatialTree::new(bounds);
         let sets = settings.sets;
+        let cells = vec![Cell::default()];
         let apart = vec![Apart::default(); usize::from(sets != GuideSets::One)];
         let field = Arc::new(Field::new(
             tree.clone(),
             vec![Leaf::default()],
             settings.cosine,
             sets,
-            apart.iter().map(|apart| apart.leaf(&settings)).collect(),
+            apart.iter().map(|apart| apart.leaf(&cells[0], &settings)).collect(),
         ));
-        let cells = vec![Cell::default()];
         Learner { settings, tree, cells, apart, field, taken: 0, iterations: 0, full: false }
     }
 

@@ -74,13 +74,18 @@ impl Mixing {
         (1.0 - self.p()).clamp(LIMITS.0, LIMITS.1)
     }
 
-    /// Probability of the first of two sets, given that the direction comes from the guide.
-    pub fn p_first(&self) -> f32 {
-        self.p().clamp(LIMITS.0, LIMITS.1)
+    /// Probability of the first of two sets, given that the direction comes from the guide. Before anything was learnt it
+    /// is the logistic function of `origin`.
+    pub fn p_first(&self, origin: f32) -> f32 {
+        self.p_from(origin).clamp(LIMITS.0, LIMITS.1)
     }
 
     fn p(&self) -> f32 {
-        1.0 / (1.0 + (-self.theta).exp())
+        self.p_from(0.0)
+    }
+
+    fn p_from(&self, origin: f32) -> f32 {
+        1.0 / (1.0 + (-(self.theta + origin)).exp())
     }
 
     /// Takes in a record, to learn the probability of the BSDF.
@@ -89,20 +94,20 @@ impl Mixing {
         match kind {
             RecordKind::Unguided => {}
             // The guide has no part in a delta lobe.
-            RecordKind::Delta => self.follow(scattered, |p| 1.0 / p),
+            RecordKind::Delta => self.follow(scattered, 0.0, |p| 1.0 / p),
             RecordKind::Mixed => {
-                self.follow(scattered, |p| (pdf_bsdf - pdf_guide) / (p * pdf_bsdf + (1.0 - p) * pdf_guide));
+                self.follow(scattered, 0.0, |p| (pdf_bsdf - pdf_guide) / (p * pdf_bsdf + (1.0 - p) * pdf_guide));
             }
         }
     }
 
     /// Takes in a record, to learn the probability of the first of two sets in a guide that has this probability itself.
-    pub fn step_sets(&mut self, record: &GuideRecord, p_guide: f32) {
+    pub fn step_sets(&mut self, record: &GuideRecord, p_guide: f32, origin: f32) {
         let GuideRecord { scattered, pdf_bsdf, pdf_sets: [first, second], kind, .. } = *record;
         // A delta lobe says nothing about either, nor does a place that has one alone.
         if kind == RecordKind::Mixed && first != second {
             let rest = (1.0 - p_guide) * pdf_bsdf;
-            self.follow(scattered, |p| {
+            self.follow(scattered, origin, |p| {
                 p_guide * (first - second) / (rest + p_guide * (p * first + (1.0 - p) * second))
             });
         }
@@ -111,13 +116,13 @@ impl Mixing {
     /// Goes a step, where a mixture in which the first part has probability p has the density q, and (∂q/∂p)/q is
     /// `slope(p)`.
     #[inline(always)]
-    fn follow(&mut self, scattered: f32, slope: impl FnOnce(f32) -> f32) {
+    fn follow(&mut self, scattered: f32, origin: f32, slope: impl FnOnce(f32) -> f32) {
         self.sum += f64::from(scattered);
         self.count += 1.0;
         if scattered <= 0.0 {
             return;
         }
-        let p = self.p();
+        let p = self.p_from(origin);
         let share = slope(p);
         let product = (f64::from(scattered) / (self.sum / self.count)) as f32;
         let gradient = -product * share * p * (1.0 - p) + REGULARISATION * self.theta;
@@ -198,7 +203,7 @@ mod tests {
         };
         let (mut of_guide, mut of_first, mut pcg) = (Mixing::default(), Mixing::default(), Pcg32::new(7, 7));
         for _ in 0..rounds {
-            let used = [of_guide.p_guide(), of_first.p_first()];
+            let used = [of_guide.p_guide(), of_first.p_first(0.0)];
             for _ in 0..500 {
                 let u = pcg.next_f32();
                 let x = match (pcg.next_f32() < used[0], pcg.next_f32() < used[1]) {
@@ -207,7 +212,7 @@ mod tests {
                     (true, false) => 0.1 + 0.2 * u,
                 };
                 let [first, second] = densities(x);
-                let c = of_first.p_first();
+                let c = of_first.p_first(0.0);
                 let record = GuideRecord {
                     p: Vec3::ZERO,
                     d: Vec3::Z,
@@ -223,10 +228,10 @@ mod tests {
                 };
                 let p_guide = of_guide.p_guide();
                 of_guide.step(&record);
-                of_first.step_sets(&record, p_guide);
+                of_first.step_sets(&record, p_guide, 0.0);
             }
         }
-        [of_guide.p_guide(), of_first.p_first()]
+        [of_guide.p_guide(), of_first.p_first(0.0)]
     }
 
     #[test]
@@ -257,13 +262,13 @@ mod tests {
             primary: false,
         };
         let mut mixing = Mixing::default();
-        mixing.step_sets(&record, 0.5);
-        mixing.step_sets(&GuideRecord { kind: RecordKind::Delta, pdf_sets: [0.0, 1.0], ..record }, 0.5);
+        mixing.step_sets(&record, 0.5, 0.0);
+        mixing.step_sets(&GuideRecord { kind: RecordKind::Delta, pdf_sets: [0.0, 1.0], ..record }, 0.5, 0.0);
         assert_eq!(mixing, Mixing::default());
         for scattered in [f32::MAX, 1e-38, 0.0, 1.0] {
             for pdf_sets in [[0.0, 1.0], [f32::MAX, 0.0], [f32::INFINITY, 1.0], [1e-38, 0.0]] {
-                mixing.step_sets(&GuideRecord { scattered, pdf_bsdf: 0.0, pdf_sets, ..record }, 0.95);
-                assert!(mixing.theta.is_finite() && (LIMITS.0..=LIMITS.1).contains(&mixing.p_first()));
+                mixing.step_sets(&GuideRecord { scattered, pdf_bsdf: 0.0, pdf_sets, ..record }, 0.95, 0.0);
+                assert!(mixing.theta.is_finite() && (LIMITS.0..=LIMITS.1).contains(&mixing.p_first(0.0)));
             }
         }
     }

@@ -27,6 +27,8 @@
 //! | `ending` | string | doubling | when the last iteration begins: once the one after it could not be completed (`doubling`), or, from 256 samples per pixel on, as soon as the `variance` that the rest of the budget would leave rises from one iteration to the next |
 //! | `combination` | string | inverse_variance | which iterations make the picture: the last four by `inverse_variance`, or the `last` |
 //! | `max_memory` | float | 64 | MiB that the trees may take; then they stay coarser |
+//! | `file` | string | unset | a file to begin with, if it is there, and to leave what was learnt in; a relative name is looked for beside the scene. Only `render` writes it, and its `--guide-file` takes the place of both this and `frozen` |
+//! | `frozen` | boolean | false | nothing is learnt, and the file, which must be there, stays as it is |
 //!
 //! Where light is found rarely but from few directions, as that of a small lamp through glass, `prior` hides what was
 //! found: 0 may be better there. `lucerna compare scene.xml -m path path+guide=sd_tree path+guide=sd_tree:prior=0` tells
@@ -67,11 +69,12 @@ mod sums;
 
 use learner::Learner;
 use lucerna_core::interfaces::{
-    Combination, EmitterSampling, Ending, Guide, GuideLearner, GuideSets, MOST_GUIDED, Training,
+    Combination, EmitterSampling, Ending, Guide, GuideFile, GuideLearner, GuideSets, MOST_GUIDED, Training,
 };
 use lucerna_core::io::Result;
 use lucerna_core::math::Aabb;
-use lucerna_core::scene::{Built, Constructor, Param, Plugin, Properties};
+use lucerna_core::render::Learnt;
+use lucerna_core::scene::{Built, Constructor, Failed, Param, Plugin, Properties};
 use std::sync::Arc;
 
 /// Table entry.
@@ -110,6 +113,8 @@ pub const PLUGIN: Plugin = Plugin {
             "which iterations make the picture",
         ),
         Param::float("max_memory", 64.0, "MiB that the trees may take").at_least(0.0),
+        Param::string_opt("file", "a file to begin with, and to leave what was learnt in"),
+        Param::bool("frozen", false, "nothing is learnt, and the file stays as it is"),
     ]],
     build: Constructor::Guide(build),
 };
@@ -199,12 +204,26 @@ fn build(p: &Properties<'_>) -> Built<dyn Guide> {
         least_roughness: p.float("roughness_threshold"),
         candidates: if p.choice("product") == "resampling" { number("candidates") } else { 1 },
     };
-    Ok(Arc::new(SdTree { settings, training }))
+    Ok(Arc::new(SdTree { settings, training, file: file(p)? }))
+}
+
+/// The file that the scene names, which can be read if it is there.
+fn file(p: &Properties<'_>) -> std::result::Result<Option<GuideFile>, Failed> {
+    let frozen = p.bool("frozen");
+    if p.string_opt("file").is_none() {
+        return if frozen { Err(p.error("frozen", "\"frozen\" needs a \"file\"")) } else { Ok(None) };
+    }
+    let path = if frozen { p.file("file")? } else { p.file_to_write("file")? };
+    if path.exists() {
+        Learnt::read(&path).map_err(|e| p.error("file", e.to_string()))?;
+    }
+    Ok(Some(GuideFile { path, frozen }))
 }
 
 struct SdTree {
     settings: Settings,
     training: Training,
+    file: Option<GuideFile>,
 }
 
 /// Records after which a cell of space is halved where nothing but outlooks is learnt.
@@ -237,7 +256,7 @@ pub(crate) fn outlook_alone() -> Arc<dyn Guide> {
         least_roughness: 0.0,
         candidates: 1,
     };
-    Arc::new(SdTree { settings, training })
+    Arc::new(SdTree { settings, training, file: None })
 }
 
 impl Guide for SdTree {
@@ -251,6 +270,10 @@ impl Guide for SdTree {
 
     fn kept_as(&self) -> Option<&'static str> {
         Some(if self.settings.directions { PLUGIN.name } else { "outlook" })
+    }
+
+    fn file(&self) -> Option<GuideFile> {
+        self.file.clone()
     }
 
     fn recall(&self, bounds: Aabb, saved: &[u8]) -> Result<Box<dyn GuideLearner>> {

@@ -6,13 +6,14 @@
 //! | `primary_product` | at first hits, the light that they scatter towards the camera: radiance times BSDF times cosine | all of the guide at first hits; never multiplied by the cosine | section 7.6 |
 //!
 //! The text leaves open how c is learnt. Here it follows the divergence of the whole mixture, of both sets and the BSDF, just
-//! as the probability of the BSDF does: both go towards what is ideal together. Light through surfaces that let rays straight
-//! through is not met directly: emitter sampling cannot see it either.
+//! as the probability of the BSDF does: both go towards what is ideal together. It begins at the part of the flux, with which
+//! both sets are what one would be, instead of at one half: where little light is met directly, that costs much at first.
+//! Light through surfaces that let rays straight through is not met directly: emitter sampling cannot see it either.
 
 use super::Settings;
 use super::field::Leaf;
 use super::learner::{Cell, Learner, Part, filled, put};
-use super::mixing::Mixing;
+use super::mixing::{LIMITS, Mixing};
 use super::prior;
 use super::quadtree::Quadtree;
 use super::sums::{Refinement, Sums};
@@ -67,27 +68,34 @@ impl Apart {
         size_of::<Apart>() + size_of::<ApartLeaf>() + self.sums.bytes() + tree
     }
 
+    /// Where the descent begins: at the part of the flux that is here. Then both sets together are what one would be.
+    fn origin(&self, cell: &Cell) -> f32 {
+        let part = self.fluence / (self.fluence + cell.fluence);
+        let part = if part.is_finite() { part.clamp(LIMITS.0, LIMITS.1) } else { 0.5 };
+        (part / (1.0 - part)).ln()
+    }
+
     /// What can be sampled.
-    pub fn leaf(&self, settings: &Settings) -> ApartLeaf {
+    pub fn leaf(&self, cell: &Cell, settings: &Settings) -> ApartLeaf {
         let p = match settings.sets {
             GuideSets::PrimaryProduct => settings.p_guide.unwrap_or_else(|| self.mixing.p_guide()),
-            _ => self.mixing.p_first(),
+            _ => self.mixing.p_first(self.origin(cell)),
         };
         ApartLeaf { directions: self.directions.clone(), p, fluence: self.fluence }
     }
 
     /// Takes a part of a record in, whose light goes to either set.
-    fn take_light(&mut self, cell: &mut Cell, record: &GuideRecord, share: f64, settings: &Settings) {
+    fn take_light(&mut self, cell: &mut Cell, origin: f32, (record, share): (&GuideRecord, f64), settings: &Settings) {
         let filter = settings.directional_filter;
         let GuideRecord { radiance, direct, pdf_sets: [first, second], .. } = *record;
         cell.take(&GuideRecord { radiance: (radiance - direct).max(0.0), ..*record }, share, filter);
         put(&mut self.sums, record.d, share * f64::from(direct) / f64::from(record.pdf), filter);
         let p_guide = settings.p_guide.unwrap_or_else(|| cell.mixing.p_guide());
         if settings.p_guide.is_none() {
-            let c = self.mixing.p_first();
+            let c = self.mixing.p_first(origin);
             cell.mixing.step(&GuideRecord { pdf_guide: c * first + (1.0 - c) * second, ..*record });
         }
-        self.mixing.step_sets(record, p_guide);
+        self.mixing.step_sets(record, p_guide, origin);
     }
 
     /// Takes a part of the record of a first hit in.
@@ -109,11 +117,12 @@ impl Learner {
         let settings = &self.settings;
         let both: Vec<_> = filled(&mut self.cells, parts).into_iter().zip(filled(&mut self.apart, parts)).collect();
         both.into_par_iter().for_each(|((cell, parts), (apart, _))| {
+            let origin = apart.origin(cell);
             for part in parts {
                 let record = &tiles[part.tile as usize][part.record as usize];
                 let share = f64::from(part.share);
                 if settings.sets == GuideSets::DirectIndirect {
-                    apart.take_light(cell, record, share, settings);
+                    apart.take_light(cell, origin, (record, share), settings);
                 } else if record.primary {
                     apart.take_product(record, share, settings);
                 } else {
@@ -150,7 +159,7 @@ impl Learner {
 
     /// What is known apart, if anything.
     pub(super) fn apart_leaves(&self) -> Vec<ApartLeaf> {
-        self.apart.iter().map(|apart| apart.leaf(&self.settings)).collect()
+        self.apart.iter().zip(&self.cells).map(|(apart, cell)| apart.leaf(cell, &self.settings)).collect()
     }
 
     /// A few words about it.

@@ -11,6 +11,7 @@
 use super::{Arena, Bxdf, Lobes, Outlook, SurfaceHit};
 use crate::io::{IoError, Result};
 use crate::math::{Aabb, Vec2, Vec3};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// The largest probability with which a direction comes from a guide.
@@ -29,6 +30,11 @@ pub trait Guide: Send + Sync {
         None
     }
 
+    /// The file that a run begins with and leaves what it has learnt in, if the scene names one.
+    fn file(&self) -> Option<GuideFile> {
+        None
+    }
+
     /// Somebody who knows what [`GuideLearner::save`] wrote of a scene inside the same `bounds`. The bytes may be
     /// anything; they are checked.
     ///
@@ -37,6 +43,15 @@ pub trait Guide: Send + Sync {
     fn recall(&self, _bounds: Aabb, _saved: &[u8]) -> Result<Box<dyn GuideLearner>> {
         Err(IoError::new("what this guide learns cannot be kept"))
     }
+}
+
+/// A file that a guided run begins with, if it is there, and leaves what it has learnt in.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GuideFile {
+    /// The file.
+    pub path: PathBuf,
+    /// Nothing is learnt, and the file stays as it is.
+    pub frozen: bool,
 }
 
 /// How a run learns and what it keeps of its iterations.

@@ -1,24 +1,15 @@
 //! What a guide has learnt, as a file: for other runs in the same scene, and to be looked at.
 
 use super::RenderError;
-use crate::interfaces::{Guide, GuideLearner, mix};
+use crate::interfaces::{Guide, GuideFile, GuideLearner, mix};
 use crate::io::limits::Cursor;
 use crate::io::sealed::{self, Kind, Packer};
 use crate::io::{IoError, Result};
 use crate::math::{Aabb, Vec3};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Files of what was learnt.
 const KIND: Kind = Kind { magic: *b"LUCGUIDE", version: 1, what: "a file of what a guide has learnt" };
-
-/// A file that a guided run begins with, if it is there, and leaves what it has learnt in.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct GuideFile {
-    /// The file.
-    pub path: PathBuf,
-    /// Nothing is learnt, and the file stays as it is.
-    pub frozen: bool,
-}
 
 /// What such a file holds.
 #[derive(Clone, Debug, PartialEq)]

@@ -18,11 +18,12 @@ mod tabulated_filter;
 mod tiles;
 mod training;
 
+pub use crate::interfaces::GuideFile;
 pub use bad_samples::{BadSample, BadSamples};
 pub use checkpoint::Checkpoint;
 pub use control::{Budget, Clock, Control, OnPass, PassEnd, Progress, Schedule};
 pub use film_store::FilmStore;
-pub use learnt::{GuideFile, Learnt};
+pub use learnt::Learnt;
 pub use notebook::{Notebook, Place, Scattering};
 pub use reference_order::ReferenceOrder;
 pub use tiles::{render_estimator, replay};
@@ -71,8 +72,11 @@ pub struct RenderContext<'a> {
     pub store: FilmStore,
     /// Where the state of the run is kept, if it is.
     pub checkpoint: Option<Checkpoint>,
-    /// Where a guide keeps what it learns, if it does.
+    /// Where a guide keeps what it learns, if it does. It stands before a file that the scene names.
     pub guide_file: Option<GuideFile>,
+    /// Whether what was learnt is left in a file that the scene names. A run that is one of several only begins with it, or
+    /// each would depend on those before.
+    pub leaves_learnt: bool,
 }
 
 impl<'a> RenderContext<'a> {
@@ -104,8 +108,21 @@ impl<'a> RenderContext<'a> {
         let seed = seed.wrapping_add(camera.sampler.seed());
         let (sensor, sampler) = (&*camera.sensor, &*camera.sampler);
         let order = SampleOrder::PerSample;
-        let (checkpoint, guide_file) = (None, None);
-        RenderContext { scene, sensor, film, sampler, budget, seed, order, control, store, checkpoint, guide_file }
+        let (checkpoint, guide_file, leaves_learnt) = (None, None, false);
+        RenderContext {
+            scene,
+            sensor,
+            film,
+            sampler,
+            budget,
+            seed,
+            order,
+            control,
+            store,
+            checkpoint,
+            guide_file,
+            leaves_learnt,
+        }
     }
 
     /// The picture as it is now.

@@ -57,8 +57,12 @@ pub(super) struct Standing {
 }
 
 impl Standing {
-    /// At the start: with what the context's file has, or nothing.
-    pub fn begin(cx: &RenderContext<'_>, guide: &dyn Guide) -> std::result::Result<Self, RenderError> {
+    /// At the start: with what a file has, or nothing.
+    pub fn begin(
+        cx: &RenderContext<'_>,
+        guide: &dyn Guide,
+        file: Option<&GuideFile>,
+    ) -> std::result::Result<Self, RenderError> {
         let bounds = cx.scene.accel().bounds();
         let startup = guide.training().startup;
         let mut course = Course {
@@ -74,7 +78,7 @@ impl Standing {
             enough: false,
         };
         let open = |file: &GuideFile| file.open(guide, bounds);
-        let learner = match cx.guide_file.as_ref().map(open).transpose()?.flatten() {
+        let learner = match file.map(open).transpose()?.flatten() {
             Some((learnt, learner)) => {
                 course.seed = learnt.other_seed(cx.seed);
                 if learnt.spp > 0 {

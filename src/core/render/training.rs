@@ -19,6 +19,7 @@ use super::{Budget, Learnt, RenderContext, RenderError, Report, SampleOrder};
 use crate::interfaces::{
     Arena, CameraRay, EmitterSampling, Ending, Goal, Guide, GuideField, GuideSets, Radiance, Subjects, Training,
 };
+use crate::io::output::check_replaceable;
 use crate::sampling::Stream;
 use crate::scene::Scene;
 use glam::IVec2;
@@ -90,27 +91,34 @@ pub fn render_guided(
     if cx.checkpoint.is_some() && guide.kept_as().is_none() {
         return Err(RenderError("what this guide learns cannot be kept in a checkpoint".to_owned()));
     }
+    let file = cx.guide_file.clone().or_else(|| guide.file());
+    // Where what is learnt is left.
+    let left_in = file.as_ref().filter(|file| !file.frozen && (cx.guide_file.is_some() || cx.leaves_learnt));
+    if let Some(file) = left_in {
+        check_replaceable(&file.path).map_err(|e| RenderError(format!("{}: {e}", file.path.display())))?;
+    }
     let asked = asked_spp(cx);
     let keeper = Keeper::of(cx)?;
     let resume = |keeper: &Keeper<'_>| keeper.resume(|from| Standing::unpack(from, cx, guide, asked));
     let at = match keeper.as_ref().map(resume).transpose()?.flatten() {
         Some(at) => at,
-        None => Standing::begin(cx, guide)?,
+        None => Standing::begin(cx, guide, file.as_ref())?,
     };
     cx.seed = at.course.seed;
     let points = points(cx, asked);
     let run = Run::new(cx, points.as_deref(), asked);
     run.goes_on(&at.report);
     let (training, earlier) = (guide.training(), at.report.seconds);
+    let frozen = file.as_ref().is_some_and(|file| file.frozen);
+    let (keeps, pace, snapshot) = (left_in.is_some(), 0.0, None);
     let mut lesson =
-        Lesson { cx, run, estimator, training, subjects, keeper, at, asked, earlier, pace: 0.0, snapshot: None };
+        Lesson { cx, run, estimator, training, subjects, keeper, at, asked, frozen, keeps, earlier, pace, snapshot };
     lesson.iterations();
     let Lesson { run, at, .. } = lesson;
     let Standing { course, mut report, pictures, learner, .. } = at;
     run.conclude(&mut report, earlier);
     report.notes.splice(0..0, learner.summary());
-    if let (Some(file), Some(name)) = (&cx.guide_file, guide.kept_as())
-        && !file.frozen
+    if let (Some(file), Some(name)) = (left_in, guide.kept_as())
         && (course.taught || (report.spp > 0 && !file.path.exists()))
     {
         let bounds = cx.scene.accel().bounds();
@@ -131,6 +139,10 @@ struct Lesson<'r, 'a> {
     at: Standing,
     /// Samples per pixel of the whole run.
     asked: u32,
+    /// Nothing is learnt.
+    frozen: bool,
+    /// What is learnt is kept.
+    keeps: bool,
     /// Seconds of earlier parts of the run.
     earlier: f64,
     /// Seconds that a sample per pixel took in the latest pass; 0 before.
@@ -191,18 +203,16 @@ impl Lesson<'_, '_> {
     /// The next iteration, if there is to be one.
     fn part(&self) -> Option<Part> {
         let Course { startup, first, index, pace, .. } = self.at.course;
-        let file = self.cx.guide_file.as_ref();
-        let (frozen, keeps) = (file.is_some_and(|file| file.frozen), file.is_some_and(|file| !file.frozen));
         let is_startup = index < startup;
         let wanted = if is_startup { 1 } else { self.at.report.spp.max(first) };
-        let enough = frozen || self.at.course.enough;
+        let enough = self.frozen || self.at.course.enough;
         let (begin, left) = (self.at.report.spp, self.asked - self.at.report.spp);
         let likely = self.samples_left(pace);
         // What would be left for another one is less than it should have: this one is the last, and takes it.
         let last = enough || (!is_startup && likely < wanted.saturating_mul(2));
         let size = if last { left } else { wanted.min(left) };
         // Nobody learns from the last one, unless what was learnt is kept.
-        let learning = if last || size == left { keeps && wanted <= likely } else { true };
+        let learning = if last || size == left { self.keeps && wanted <= likely } else { true };
         (size > 0).then_some(Part { startup: is_startup, spp: (begin, begin + size), wanted, learning })
     }
 

@@ -19,7 +19,7 @@ use crate::math::{Transform, Vec3};
 use glam::DMat4;
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// The parameters and built children of one object.
@@ -203,6 +203,24 @@ impl<'a> Properties<'a> {
                 Err(failed)
             }
         }
+    }
+
+    /// A file that may be written: the existing one that is found under this name, or a new one, in the folder where files
+    /// are searched first if the name is relative.
+    pub fn file_to_write(&self, name: &str) -> Result<PathBuf, Failed> {
+        let text = self.string(name);
+        if self.description.find_file(text).is_some() {
+            return self.file(name);
+        }
+        let folder = self.description.search_path.first().map_or(Path::new("."), |folder| folder);
+        let path = folder.join(text);
+        let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let usable = match path.file_name() {
+            None => Err("the name is not that of a file".to_owned()),
+            Some(_) if !parent.is_dir() => Err("its folder does not exist".to_owned()),
+            Some(_) => self.description.check_confinement(parent),
+        };
+        usable.map(|()| path).map_err(|why| self.error(name, format!("the file \"{text}\" cannot be written: {why}")))
     }
 
     /// A point or direction, if set or with a default.

@@ -170,7 +170,7 @@ impl Writer<'_> {
             Value::Float(number) => line("float", &decimal(*number)),
             Value::Integer(number) => line("integer", &number.to_string()),
             Value::Boolean(truth) => line("boolean", &truth.to_string()),
-            Value::String(file) if name == "filename" => line("string", &self.file_name(file)),
+            Value::String(file) if name == "filename" || name == "file" => line("string", &self.file_name(file)),
             Value::String(text) => line("string", text),
             Value::Vector(vector) => {
                 let tag = if POINTS.contains(&name) { "point" } else { "vector" };
