@@ -16,7 +16,7 @@
 //! | `hide_emitters` | boolean | false | lights are not seen directly; the light they give is unchanged |
 //! | nested `light_sampler` | | by the scene's weights | which light a vertex samples |
 //! | nested `guide` | | none | learns where light comes from, as `sd_tree` |
-//! | nested `roulette` | | `throughput`; with a guide `albedo` | whether a path goes on, stops or splits |
+//! | nested `roulette` | | `throughput`; with a guide `adjoint` | whether a path goes on, stops or splits |
 //!
 //! ```xml
 //! <integrator type="path">
@@ -29,7 +29,7 @@ use super::directions::Unguided;
 use super::guided::Guided;
 use super::lights::{ByScene, LIGHTS, Lights};
 use super::path_kernel::trace;
-use crate::roulettes::{ByAlbedo, ByThroughput};
+use crate::roulettes::ByThroughput;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{Arena, CameraRay, Guide, Integrator, Radiance, RadianceEstimator, Roulette, Subjects};
 use lucerna_core::render::{
@@ -58,7 +58,8 @@ pub const PLUGIN: Plugin = Plugin {
 
 fn build(p: &Properties<'_>) -> Built<dyn Integrator> {
     let (limits, lights, timeout) = (PathLimits::new(p), Lights::new(p), timeout(p));
-    let (guide, roulette) = (p.guide(), p.roulette());
+    let guide = p.guide();
+    let roulette = p.roulette().or_else(|| guide.is_some().then(crate::roulettes::by_default));
     let teacher = roulette.as_ref().and_then(|roulette| roulette.teacher());
     let subjects = Subjects { directions: guide.is_some(), outlook: teacher.is_some() };
     Ok(Arc::new(Path { limits, lights, timeout, teacher: guide.or(teacher), subjects, roulette }))
@@ -142,7 +143,7 @@ impl GuidedEstimator for Path {
         let arena = &*arena;
         let mut directions = Guided { guidance, notes, arena, prospects: Rgb::WHITE };
         let (limits, to) = (self.limits, &mut directions);
-        let roulette: &dyn Roulette = self.roulette.as_deref().unwrap_or(&ByAlbedo);
+        let roulette: &dyn Roulette = self.roulette.as_deref().unwrap_or(&ByThroughput);
         match self.lights.ready() {
             None => trace(limits, scene, &ByScene, &roulette, camera, stream, arena, to),
             Some(lights) => trace(limits, scene, &lights, &roulette, camera, stream, arena, to),

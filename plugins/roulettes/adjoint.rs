@@ -5,7 +5,7 @@
 //! what the samples before have found for the pixel. If their ratio is within a window about 1 the path goes on; below,
 //! it goes on with a probability that makes up for it, not less than 0.05; above, it splits, into 20 at most. This is
 //! decided before light is sampled at a vertex, not at the first one, nor at delta lobes, which go by the throughput
-//! from `rr_depth` on. Where nothing is known it is as `throughput`, but no probability is below 0.05.
+//! from `rr_depth` on. What a guided `path` does without a roulette. Where nothing is known it is as `throughput`, but no probability is below 0.05.
 //!
 //! What scattering brings is learnt in a tree over space while the picture forms, in the tree of the guide `sd_tree` if
 //! there is one; it is the same for all directions on one side of a surface, relative to the albedo. Pictures are
@@ -13,7 +13,7 @@
 //!
 //! | parameter | type | default | meaning |
 //! |---|---|---|---|
-//! | `window` | float | 3 | upper end of the window over the lower; 1 is the middle of both |
+//! | `window` | float | 5 | upper end of the window over the lower; 1 is the middle of both |
 //!
 //! Limits. It pays where light is bounced often or arrives from places that few paths see, as in a room that is lit
 //! through a door ajar, and the more, the more samples there are to learn from. In simple scenes under light that is
@@ -23,7 +23,7 @@
 //! ```xml
 //! <integrator type="path">
 //!     <roulette type="adjoint">
-//!         <float name="window" value="5"/>
+//!         <float name="window" value="3"/>
 //!     </roulette>
 //! </integrator>
 //! ```
@@ -35,25 +35,31 @@ use lucerna_core::interfaces::{Guide, Outlook, PathState, Roulette};
 use lucerna_core::scene::{Built, Constructor, Param, Plugin, Properties};
 use std::sync::Arc;
 
+/// The window's default.
+const WINDOW: f64 = 5.0;
+
 /// Table entry.
 pub const PLUGIN: Plugin = Plugin {
     name: "adjoint",
     aliases: &[],
     summary: "paths end or split by what they are expected to bring",
     params: &[&[
-        Param::float("window", 3.0, "largest weight that neither ends nor splits, over the smallest").at_least(1.0),
-        Param::float("least", 0.05, "probability with which a path goes on at least").range(0.05, 1.0),
+        Param::float("window", WINDOW, "largest weight that neither ends nor splits, over the smallest").at_least(1.0)
     ]],
     build: Constructor::Roulette(build),
 };
 
 fn build(p: &Properties<'_>) -> Built<dyn Roulette> {
-    Ok(Arc::new(Adjoint { window: p.float("window"), least: p.float("least") }))
+    Ok(Arc::new(Adjoint { window: p.float("window") }))
+}
+
+/// What guided paths go by unless another roulette is named.
+pub(crate) fn by_default() -> Arc<dyn Roulette> {
+    Arc::new(Adjoint { window: WINDOW as f32 })
 }
 
 struct Adjoint {
     window: f32,
-    least: f32,
 }
 
 impl Roulette for Adjoint {
@@ -70,7 +76,7 @@ impl Roulette for Adjoint {
         }
         let low = 2.0 / (1.0 + self.window);
         let high = self.window * low;
-        limited(path, if weight < low { (weight / low).max(self.least) } else { (weight / high).max(1.0) })
+        limited(path, if weight < low { weight / low } else { (weight / high).max(1.0) })
     }
 
     fn survival(&self, path: &PathState, delta: bool) -> f32 {

@@ -23,7 +23,7 @@ use std::sync::Arc;
 pub const PLUGIN: Plugin = Plugin {
     name: "albedo",
     aliases: &[],
-    summary: "paths end by the product of albedos: the default of guided ones",
+    summary: "paths end by the product of albedos",
     params: &[],
     build: Constructor::Roulette(build),
 };
@@ -32,8 +32,7 @@ fn build(_p: &Properties<'_>) -> Built<dyn Roulette> {
     Ok(Arc::new(ByAlbedo))
 }
 
-/// The decision.
-pub(crate) struct ByAlbedo;
+struct ByAlbedo;
 
 impl Roulette for ByAlbedo {
     fn survival(&self, path: &PathState, _delta: bool) -> f32 {

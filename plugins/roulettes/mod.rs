@@ -1,14 +1,14 @@
 //! All decisions whether paths go on: one file each, one line each in [`PLUGINS`].
 //!
 //! They are nested in the integrator `path`, or named with `--roulette`. Without one a path goes by its throughput, and
-//! a guided one by the albedo.
+//! a guided one by what it is expected to bring (`adjoint`).
 
 mod adjoint;
 mod albedo;
 mod efficiency;
 mod throughput;
 
-pub(crate) use albedo::ByAlbedo;
+pub(crate) use adjoint::by_default;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{LEAST_SURVIVAL, PathState};
 use lucerna_core::scene::Plugin;

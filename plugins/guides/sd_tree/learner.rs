@@ -14,7 +14,7 @@
 //! | descent: rate, decays, regularisation | 0.01, 0.9 and 0.999, 0.01 | the same |
 //! | light that emitter sampling finds | not learnt, or by its weight | by its weight |
 //! | weights of iterations | inverse mean variance of themselves | of the other half of the pixels |
-//! | roulette | none, or by the light ahead | by the albedo at guided vertices, or the throughput if it is larger |
+//! | roulette | none, or by the light ahead | by the light ahead, learnt for each side of surfaces in a cell |
 //! | iterations at the start, then | 8 of 1 sample, then 1, 2, 4, … | 8 of 1 sample, then as many as all before: 8, 16, 32, … |
 //! | the last iteration | as long as two would be | from half to twice as long as all before: guided by a third of all samples or more, instead of by an eighth |
 

@@ -12,7 +12,7 @@
 //! | `spatial_threshold` | float | 500 | a cell of space is halved with more records than this times √(samples per pixel of the iteration) |
 //! | `directional_threshold` | float | 0.01 | a cell of directions is divided with more than this part of the flux |
 //! | `directional_depth` | integer | 20 | levels of quadtrees at most, from 3 to 20 |
-//! | `prior` | float | 8 | what larger cells of space have found counts as much as so many records, and so does, inside a cell of directions, light from everywhere; 0 as published |
+//! | `prior` | float | 1 | what larger cells of space have found counts as much as so many records, and so does, inside a cell of directions, light from everywhere; 0 as published |
 //! | `memory` | float | 0.5 | part of what was found that still counts an iteration later; 0 as published |
 //! | `spatial_filter` | string | stochastic | records go to the cell they lie in (`nearest`), to one in a box about it (`stochastic`), or to all of the `box` by volume |
 //! | `directional_filter` | string | box | records go to the directions they lie in (`nearest`), or to all in a `box` about them by area |
@@ -42,8 +42,8 @@
 //! both filters `nearest`, `p_guide` 0.5, `product` `none`, `startup` 0 and `combination` `last` are nearly the form of
 //! 2017.
 //!
-//! Roulette begins at the integrator's `rr_depth`. Where light arrives after many bounces it ends paths that matter:
-//! `<roulette type="adjoint"/>` beside the guide goes by what this tree has learnt, or a larger `rr_depth` may pay.
+//! Paths go by the roulette `adjoint` unless another is named: from what this tree has learnt they end early where little
+//! light is ahead, and split where much is.
 //!
 //! What differs from the publications stands at the head of `learner.rs`.
 //!
@@ -87,7 +87,7 @@ pub const PLUGIN: Plugin = Plugin {
         Param::float("directional_threshold", 0.01, "part of the flux above which a cell of directions is divided")
             .range(1e-6, 1.0),
         Param::int("directional_depth", 20, "levels of quadtrees at most").range(3.0, quadtree::MOST_LEVELS as f64),
-        Param::float("prior", 8.0, "records that count as much as what larger cells around have found").at_least(0.0),
+        Param::float("prior", 1.0, "records that count as much as what larger cells around have found").at_least(0.0),
         Param::float("memory", 0.5, "part of what was found that still counts an iteration later").range(0.0, 1.0),
         Param::choice("spatial_filter", &["nearest", "stochastic", "box"], "stochastic", "cells a record goes to"),
         Param::choice("directional_filter", &["nearest", "box"], "box", "directions a record goes to"),
