@@ -33,6 +33,9 @@
 //! Where light is found rarely but from few directions, as that of a small lamp through glass, `prior` hides what was found:
 //! 0 is better there by far.
 //!
+//! Two `sets` have to share what is found, and cost up to a fifth more: in five published rooms of about a hundred samples per
+//! pixel, either left as much noise as `one`, or up to an eighth more.
+//!
 //! Limits. A cell of space has one distribution for all its points: a bright spot near by is blurred by parallax until
 //! the cells are small, which takes millions of samples. Small or short renders, and those whose noise comes from
 //! sampled lights or from caustics that are rarely found, gain little, and each sample costs a tenth (in large scenes) to
