@@ -34,6 +34,9 @@
 //! found: 0 may be better there. `lucerna compare scene.xml -m path path+guide=sd_tree path+guide=sd_tree:prior=0` tells
 //! that, and what each sample costs.
 //!
+//! Two `sets` have to share what is found, and cost up to a fifth more: in five published rooms of about a hundred samples per
+//! pixel, either left as much noise as `one`, or up to an eighth more.
+//!
 //! Limits. A cell of space has one distribution for all its points: a bright spot near by is blurred by parallax until
 //! the cells are small, which takes millions of samples. Small or short renders, and those whose noise comes from
 //! sampled lights or from caustics that are rarely found, gain little, and each sample costs more: least where rays are
