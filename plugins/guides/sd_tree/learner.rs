@@ -28,8 +28,10 @@ use super::sets::Apart;
 use super::spatial::SpatialTree;
 use super::sums::{Refinement, Sums};
 use super::{DirectionalFilter, Settings, SpatialFilter};
-use lucerna_core::interfaces::{GuideFact, GuideField, GuideLearner, GuideRecord, GuideSets, VertexRecord, mix};
-use lucerna_core::math::{Aabb, Vec3};
+use lucerna_core::interfaces::{
+    GuideFact, GuideField, GuideLearner, GuideRecord, GuideSets, RecordKind, VertexRecord, mix,
+};
+use lucerna_core::math::Aabb;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -343,7 +345,7 @@ impl Cell {
     #[inline]
     pub(super) fn take(&mut self, record: &GuideRecord, share: f64, filter: DirectionalFilter) {
         self.count += share;
-        put(&mut self.sums, record.d, share * f64::from(record.radiance) / f64::from(record.pdf), filter);
+        put(&mut self.sums, record, share * f64::from(record.radiance) / f64::from(record.pdf), filter);
     }
 
     /// The part of its sums that each half has, after it was halved.
@@ -352,13 +354,14 @@ impl Cell {
     }
 }
 
-/// Adds flux from a direction, if it is any.
+/// Adds flux from a record's direction, if it is any. What a delta lobe found is none: its direction has a probability, and
+/// no density.
 #[inline]
-pub(super) fn put(sums: &mut Sums, d: Vec3, flux: f64, filter: DirectionalFilter) {
-    if !(flux > 0.0 && flux.is_finite()) {
+pub(super) fn put(sums: &mut Sums, record: &GuideRecord, flux: f64, filter: DirectionalFilter) {
+    if !(flux > 0.0 && flux.is_finite()) || record.kind == RecordKind::Delta {
         return;
     }
-    let p = cylinder::of_direction(d);
+    let p = cylinder::of_direction(record.d);
     match filter {
         DirectionalFilter::Nearest => sums.add(p, flux),
         DirectionalFilter::Box => sums.add_box(p, flux),

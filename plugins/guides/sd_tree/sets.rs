@@ -89,7 +89,7 @@ impl Apart {
         let filter = settings.directional_filter;
         let GuideRecord { radiance, direct, pdf_sets: [first, second], .. } = *record;
         cell.take(&GuideRecord { radiance: (radiance - direct).max(0.0), ..*record }, share, filter);
-        put(&mut self.sums, record.d, share * f64::from(direct) / f64::from(record.pdf), filter);
+        put(&mut self.sums, record, share * f64::from(direct) / f64::from(record.pdf), filter);
         let p_guide = settings.p_guide.unwrap_or_else(|| cell.mixing.p_guide());
         if settings.p_guide.is_none() {
             let c = self.mixing.p_first(origin);
@@ -103,7 +103,7 @@ impl Apart {
         self.count += share;
         if record.kind != RecordKind::Delta {
             // Over its density already.
-            put(&mut self.sums, record.d, share * f64::from(record.scattered), settings.directional_filter);
+            put(&mut self.sums, record, share * f64::from(record.scattered), settings.directional_filter);
         }
         if settings.p_guide.is_none() {
             self.mixing.step(record);
