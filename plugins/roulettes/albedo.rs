@@ -3,7 +3,8 @@
 //! As `throughput`, but at guided vertices the throughput counts as if it fell by the albedo only: what a path is worth
 //! is its throughput times the light ahead, and a guide lowers the one where it raises the other (Müller 2019,
 //! "Practical Path Guiding in Production", section 10.6). Where the guide was wrong the throughput is larger, and
-//! counts. What a guided `path` does without a roulette; without a guide it is the same as `throughput`.
+//! counts. Without a guide it is the same as `throughput`. Nothing has to be learnt for it; `adjoint`, which guided paths
+//! go by unless another is named, knows the light ahead.
 //!
 //! No parameters.
 //!

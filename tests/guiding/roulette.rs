@@ -213,11 +213,13 @@ fn the_number_of_threads_changes_no_bit() {
 
 /// What is there without a roulette, under its name.
 #[test]
-fn throughput_and_albedo_are_the_defaults() {
+fn throughput_and_adjoint_are_the_defaults() {
     let guide = "<guide type='sd_tree'><float name='spatial_threshold' value='100'/></guide>";
     let data = |more: &str| render(&scene(SCENES[1].1, &path(30, more)), 24, 1, SampleOrder::PerSample).0.data;
     assert!(data("") == data("<roulette type='throughput'/>"));
     assert!(data("") == data("<roulette type='albedo'/>"));
-    assert!(data(guide) == data(&format!("{guide}<roulette type='albedo'/>")));
-    assert!(data(guide) != data(&format!("{guide}<roulette type='throughput'/>")));
+    assert!(data(guide) == data(&format!("{guide}<roulette type='adjoint'/>")));
+    for other in ["throughput", "albedo"] {
+        assert!(data(guide) != data(&format!("{guide}<roulette type='{other}'/>")), "{other}");
+    }
 }
