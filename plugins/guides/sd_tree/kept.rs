@@ -30,16 +30,26 @@ use std::sync::Arc;
 /// Bytes of a tree over directions at least: number of quads, the grid, which of its cells are divided.
 const LEAST_TREE: u64 = 4 + 64 * 2 + 8;
 
-/// What a number means.
-const SETS: [GuideSets; 3] = [GuideSets::One, GuideSets::DirectIndirect, GuideSets::PrimaryProduct];
+/// What is written of a set of directions in a cell: the number of its tree (0: none), the probability that is learnt,
+/// fluence, number of records, then the rest.
+type Numbers = (u32, f32, f32, f64);
 
-/// A number of records.
-fn records(from: &mut Cursor<'_>) -> Result<f64> {
-    let count = from.f64("a cell")?;
-    match (0.0..=f64::MAX).contains(&count) {
-        true => Ok(count),
-        false => Err(IoError::new("a cell has no usable number of records")),
+fn pack_set((tree, p, fluence, count): Numbers, mixing: &Mixing, sums: &Sums, to: &mut Packer) {
+    to.u32(tree);
+    to.f32(p);
+    to.f32(fluence);
+    to.f64(count);
+    mixing.pack(to);
+    sums.pack(to);
+}
+
+fn unpack_set(from: &mut Cursor<'_>) -> Result<(Numbers, Mixing, Sums)> {
+    const WHAT: &str = "a cell";
+    let (tree, p, fluence, count) = (from.u32(WHAT)?, from.f32(WHAT)?, from.f32(WHAT)?, from.f64(WHAT)?);
+    if !(0.0..=f64::MAX).contains(&count) {
+        return Err(IoError::new("a cell has no usable number of records"));
     }
+    Ok(((tree, p, fluence, count), Mixing::unpack(from)?, Sums::unpack(from)?))
 }
 
 impl Learner {
@@ -49,7 +59,7 @@ impl Learner {
         to.u64(self.taken);
         to.u32(self.iterations);
         to.u16(self.full.into());
-        to.u16(SETS.iter().position(|sets| *sets == self.settings.sets).unwrap_or(0) as u16);
+        to.u16(sets::number(self.settings.sets) as u16);
         self.tree.pack(&mut to);
         let (mut trees, mut numbers) = (Vec::new(), HashMap::new());
         let of_cells = self.cells.iter().map(|cell| &cell.directions);
@@ -63,21 +73,13 @@ impl Learner {
         trees.iter().for_each(|tree| tree.pack(&mut to));
         let number = |tree: &Option<Arc<Quadtree>>| tree.as_ref().map_or(0, |tree| numbers[&Arc::as_ptr(tree)]);
         for (cell, leaf) in self.cells.iter().zip(&self.field.leaves) {
-            to.u32(number(&cell.directions));
-            to.f32(leaf.p_guide);
-            to.f32(cell.fluence);
-            to.f64(cell.count);
-            cell.mixing.pack(&mut to);
-            cell.sums.pack(&mut to);
+            let numbers = (number(&cell.directions), leaf.p_guide, cell.fluence, cell.count);
+            pack_set(numbers, &cell.mixing, &cell.sums, &mut to);
             outlook::pack(&cell.outlooks, &leaf.outlooks, &mut to);
         }
         for (apart, leaf) in self.apart.iter().zip(&self.field.apart) {
-            to.u32(number(&apart.directions));
-            to.f32(leaf.p);
-            to.f32(apart.fluence);
-            to.f64(apart.count);
-            apart.mixing.pack(&mut to);
-            apart.sums.pack(&mut to);
+            let numbers = (number(&apart.directions), leaf.p, apart.fluence, apart.count);
+            pack_set(numbers, &apart.mixing, &apart.sums, &mut to);
         }
         to.0
     }
@@ -90,10 +92,10 @@ impl Learner {
         let mut from = Cursor::new(bytes);
         let (taken, iterations) = (from.u64("the records taken in")?, from.u32("the iterations")?);
         let full = from.u16("the limit of memory")? != 0;
-        let sets = SETS.get(usize::from(from.u16("the sets of directions")?)).copied();
+        let sets = sets::of_number(from.u16("the sets of directions")?.into());
         let sets = sets.ok_or_else(|| IoError::new("has sets of directions that are not known"))?;
         if settings.sets_asked && settings.sets != sets {
-            let [theirs, ours] = [sets, settings.sets].map(sets::name);
+            let [theirs, ours] = [sets, settings.sets].map(|sets| sets::NAMES[sets::number(sets)]);
             return Err(IoError::new(format!("was learnt with sets \"{theirs}\", not \"{ours}\"")));
         }
         settings.sets = sets;
@@ -110,22 +112,17 @@ impl Learner {
             }
         };
         for _ in 0..tree.leaves() {
-            let directions = numbered(from.u32("a cell")?)?;
-            let (p_guide, fluence) = (from.f32("a cell")?, from.f32("a cell")?);
-            let p_guide = settings.p_guide.unwrap_or(p_guide);
-            let count = records(&mut from)?;
-            let mixing = Mixing::unpack(&mut from)?;
-            let sums = Sums::unpack(&mut from)?;
+            let ((tree, p_guide, fluence, count), mixing, sums) = unpack_set(&mut from)?;
+            let (directions, p_guide) = (numbered(tree)?, settings.p_guide.unwrap_or(p_guide));
             let (outlooks, known) = outlook::unpack(&mut from)?;
             leaves.push(Leaf { directions: directions.clone(), p_guide, fluence, outlooks: known });
             cells.push(Cell { sums, count, mixing, halved: 0, directions, fluence, outlooks });
         }
         let (mut apart, mut known) = (Vec::new(), Vec::new());
         for _ in (0..tree.leaves()).filter(|_| sets != GuideSets::One) {
-            let directions = numbered(from.u32("a cell")?)?;
-            let (p, fluence, count) = (from.f32("a cell")?, from.f32("a cell")?, records(&mut from)?);
+            let ((tree, p, fluence, count), mixing, sums) = unpack_set(&mut from)?;
             let p = settings.p_guide.filter(|_| sets == GuideSets::PrimaryProduct).unwrap_or(p);
-            let (mixing, sums) = (Mixing::unpack(&mut from)?, Sums::unpack(&mut from)?);
+            let directions = numbered(tree)?;
             known.push(ApartLeaf { directions: directions.clone(), p, fluence });
             apart.push(Apart { sums, count, mixing, directions, fluence });
         }

@@ -157,8 +157,9 @@ impl Learner {
 
     /// Bytes of everything.
     pub(super) fn bytes(&self) -> usize {
-        // Once to keep and once to sample from.
-        let tree = |cell: &Cell| 2 * cell.directions.as_ref().map_or(0, |tree| tree.bytes());
+        // Where nothing is kept apart, there is a second one to sample from.
+        let copies = if self.apart.is_empty() { 2 } else { 1 };
+        let tree = |cell: &Cell| copies * cell.directions.as_ref().map_or(0, |tree| tree.bytes());
         let cells =
             self.cells.iter().map(|cell| size_of::<Cell>() + size_of::<Leaf>() + cell.sums.bytes() + tree(cell));
         2 * self.tree.bytes() + cells.sum::<usize>() + self.apart.iter().map(Apart::bytes).sum::<usize>()

@@ -34,8 +34,8 @@
 //! found: 0 may be better there. `lucerna compare scene.xml -m path path+guide=sd_tree path+guide=sd_tree:prior=0` tells
 //! that, and what each sample costs.
 //!
-//! Two `sets` have to share what is found, and cost up to a fifth more: in five published rooms of about a hundred samples per
-//! pixel, either left as much noise as `one`, or up to an eighth more.
+//! Two `sets` have to share what is found and cost time; whether they pay in a scene tells
+//! `lucerna compare scene.xml -m path+guide=sd_tree path+guide=sd_tree:sets=direct_indirect`.
 //!
 //! Limits. A cell of space has one distribution for all its points: a bright spot near by is blurred by parallax until
 //! the cells are small, which takes millions of samples. Small or short renders, and those whose noise comes from
@@ -103,7 +103,7 @@ pub const PLUGIN: Plugin = Plugin {
         ),
         Param::int("candidates", 2, "directions of which one is chosen, if the product is by resampling")
             .range(1.0, 64.0),
-        Param::choice("sets", &["one", "direct_indirect", "primary_product"], "one", "sets of directions in each cell"),
+        Param::choice("sets", &sets::NAMES, sets::NAMES[0], "sets of directions in each cell"),
         Param::float("roughness_threshold", 0.05, "narrower lobes are not guided").range(0.0, 1.0),
         Param::choice("nee", &["never", "kickstart", "always"], "always", "when lights are sampled"),
         Param::bool("direct", true, "learns light that emitter sampling also finds, by its weight"),
@@ -180,11 +180,7 @@ fn build(p: &Properties<'_>) -> Built<dyn Guide> {
         p_guide: p.float_opt("p_guide").map(|p| p.min(MOST_GUIDED)),
         cosine: p.choice("product") != "none",
         max_bytes: (p.double("max_memory") * f64::from(1 << 20)) as usize,
-        sets: match p.choice("sets") {
-            "direct_indirect" => GuideSets::DirectIndirect,
-            "primary_product" => GuideSets::PrimaryProduct,
-            _ => GuideSets::One,
-        },
+        sets: sets::of_name(p.choice("sets")),
         sets_asked: p.has("sets"),
         directions: true,
     };

@@ -17,7 +17,7 @@ use super::mixing::{LIMITS, Mixing};
 use super::prior;
 use super::quadtree::Quadtree;
 use super::sums::{Refinement, Sums};
-use lucerna_core::interfaces::{GuideRecord, GuideSets, RecordKind};
+use lucerna_core::interfaces::{GuideRecord, GuideSets};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -46,13 +46,25 @@ pub struct ApartLeaf {
     pub fluence: f32,
 }
 
-/// The name of a choice, as scenes write it.
-pub(super) fn name(sets: GuideSets) -> &'static str {
-    match sets {
-        GuideSets::One => "one",
-        GuideSets::DirectIndirect => "direct_indirect",
-        GuideSets::PrimaryProduct => "primary_product",
-    }
+/// The choices, in the order of [`NAMES`]. Files hold their numbers.
+const CHOICES: [GuideSets; 3] = [GuideSets::One, GuideSets::DirectIndirect, GuideSets::PrimaryProduct];
+
+/// Their names, as scenes write them.
+pub(super) const NAMES: [&str; CHOICES.len()] = ["one", "direct_indirect", "primary_product"];
+
+/// The choice of a number.
+pub(super) fn of_number(number: usize) -> Option<GuideSets> {
+    CHOICES.get(number).copied()
+}
+
+/// The choice of a name; the first one if there is none.
+pub(super) fn of_name(name: &str) -> GuideSets {
+    NAMES.iter().position(|known| *known == name).and_then(of_number).unwrap_or_default()
+}
+
+/// The number of a choice.
+pub(super) fn number(sets: GuideSets) -> usize {
+    CHOICES.iter().position(|known| *known == sets).unwrap_or(0)
 }
 
 impl Apart {
@@ -101,10 +113,8 @@ impl Apart {
     /// Takes a part of the record of a first hit in.
     fn take_product(&mut self, record: &GuideRecord, share: f64, settings: &Settings) {
         self.count += share;
-        if record.kind != RecordKind::Delta {
-            // Over its density already.
-            put(&mut self.sums, record, share * f64::from(record.scattered), settings.directional_filter);
-        }
+        // Over its density already.
+        put(&mut self.sums, record, share * f64::from(record.scattered), settings.directional_filter);
         if settings.p_guide.is_none() {
             self.mixing.step(record);
         }

@@ -123,14 +123,7 @@ impl SpatialTree {
     /// The leaf in which a point lies.
     #[inline]
     pub fn at(&self, p: Vec3) -> usize {
-        let cell = self.cell(p);
-        let [mut a, mut b, mut c] = cell.map(|x| x << (32 - BITS + TOP_BITS));
-        let mut node = self.top[Self::top(cell)];
-        while node & LEAF == 0 {
-            node = self.nodes[node as usize][(a >> 31) as usize];
-            (a, b, c) = (b, c, a << 1);
-        }
-        (node & !LEAF) as usize
+        self.leaf(self.cell(p)).0 as usize
     }
 
     /// Where the table tells of a position.
