@@ -2,7 +2,7 @@
 
 use super::cone;
 use lucerna::core::interfaces::{
-    Arena, Guide, GuideField, GuideLearner, GuideRecord, GuideSets, GuidedDirections, GuidedVertex, Outlook,
+    Arena, Guide, GuideField, GuideHere, GuideLearner, GuideRecord, GuideSets, GuidedDirections, GuidedVertex, Outlook,
     SurfaceHit, Training, VertexRecord, mix,
 };
 use lucerna::core::math::{Aabb, Vec2, Vec3};
@@ -48,6 +48,8 @@ fn build(p: &Properties<'_>) -> Built<dyn Guide> {
             value("candidates", lucerna::core::scene::Value::Integer(p.int("candidates"))),
             value("sets", lucerna::core::scene::Value::String(p.string("sets").to_owned())),
             value("nee", lucerna::core::scene::Value::String(p.choice("nee").to_owned())),
+            // All vertices are spoilt.
+            value("least_gain", lucerna::core::scene::Value::Float(0.0)),
             // Small, so that a few samples make many cells.
             value("spatial_threshold", lucerna::core::scene::Value::Float(200.0)),
         ],
@@ -126,13 +128,14 @@ fn key(p: Vec3) -> u64 {
 }
 
 impl GuideField for Field {
-    fn at<'g>(&'g self, hit: &SurfaceHit, vertex: GuidedVertex, arena: &'g Arena) -> Option<&'g dyn GuidedDirections> {
+    fn at<'g>(&'g self, hit: &SurfaceHit, vertex: GuidedVertex, arena: &'g Arena) -> GuideHere<'g> {
         if self.spoils.way == "empty" {
-            return None;
+            return GuideHere::Unknown;
         }
-        let inner = self.inner.at(hit, vertex, arena)?;
+        let here = self.inner.at(hit, vertex, arena);
+        let Some(inner) = here.known() else { return here };
         let p_guide = self.spoils.p_guide.unwrap_or_else(|| inner.p_guide());
-        Some(arena.alloc(Spoilt { inner, way: &self.spoils.way, p_guide, key: key(hit.p) }))
+        GuideHere::Known(arena.alloc(Spoilt { inner, way: &self.spoils.way, p_guide, key: key(hit.p) }))
     }
 
     fn sets(&self) -> GuideSets {

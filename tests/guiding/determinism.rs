@@ -20,12 +20,13 @@ fn render(guide: &str, threads: usize, budget: Budget, control: &Control<'_>) ->
 }
 
 /// Every way of learning, with small cells so that there are many.
-const GUIDES: [&str; 6] = [
+const GUIDES: [&str; 7] = [
     "<guide type='sd_tree'><float name='spatial_threshold' value='100'/></guide>",
     "<guide type='sd_tree'><float name='spatial_threshold' value='100'/><string name='spatial_filter' value='box'/>
      <string name='nee' value='kickstart'/></guide>",
     "<guide type='sd_tree'><float name='spatial_threshold' value='100'/><string name='spatial_filter' value='nearest'/>
      <string name='directional_filter' value='nearest'/><float name='p_guide' value='0.5'/></guide>",
+    "<guide type='sd_tree'><float name='spatial_threshold' value='100'/><float name='least_gain' value='20'/></guide>",
     "<guide type='sd_tree'><float name='spatial_threshold' value='100'/><string name='product' value='resampling'/></guide>",
     "<guide type='sd_tree'><float name='spatial_threshold' value='100'/><string name='sets' value='direct_indirect'/></guide>",
     "<guide type='sd_tree'><float name='spatial_threshold' value='100'/><string name='sets' value='primary_product'/>

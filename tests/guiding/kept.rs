@@ -191,7 +191,7 @@ fn damaged(sets: &str, versions: usize) -> usize {
         let (field, arena) = (recalled.field(), Arena::new());
         for p in [Vec3::splat(0.1), Vec3::new(0.9, 0.5, 0.2)] {
             if let Some(directions) =
-                field.at(&hit(p, Vec3::Z), GuidedVertex { primary: version % 2 == 0, ..REFLECTS }, &arena)
+                field.at(&hit(p, Vec3::Z), GuidedVertex { primary: version % 2 == 0, ..REFLECTS }, &arena).known()
             {
                 let (d, pdf) = directions.sample(Vec2::new(0.3, 0.8));
                 assert!(d.is_finite() && pdf >= 0.0, "{version}: {d} {pdf}");

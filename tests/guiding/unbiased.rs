@@ -61,6 +61,7 @@ fn hc_p06_every_setting_of_the_tree_is_unbiased() {
         guide("<string name='product' value='none'/><string name='spatial_filter' value='box'/>"),
         guide("<float name='roughness_threshold' value='0'/><string name='combination' value='last'/>"),
         guide("<float name='p_guide' value='0'/>"),
+        guide("<float name='least_gain' value='20'/>"),
         guide("<float name='prior' value='0'/><float name='memory' value='0'/>"),
         guide("<string name='product' value='resampling'/>"),
         guide("<string name='sets' value='direct_indirect'/>"),

@@ -1,12 +1,15 @@
 //! What has been learnt, to be sampled.
 
 use super::cylinder;
+use super::gain;
 use super::near::Near;
 use super::outlook::{SIDES, side};
 use super::quadtree::{CELLS, EDGE, Quads, Quadtree, UNIFORM, long};
 use super::sets::{ApartLeaf, is_lit};
 use super::spatial::SpatialTree;
-use lucerna_core::interfaces::{Arena, GuideField, GuideSets, GuidedDirections, GuidedVertex, Outlook, SurfaceHit};
+use lucerna_core::interfaces::{
+    Arena, GuideField, GuideHere, GuideSets, GuidedDirections, GuidedVertex, Outlook, SurfaceHit,
+};
 use lucerna_core::math::{Vec2, Vec3};
 use std::f32::consts::PI;
 use std::sync::{Arc, LazyLock};
@@ -26,26 +29,38 @@ pub struct Field {
 }
 
 /// What is known in a cell of space.
-#[derive(Clone, Default)]
+#[derive(Clone)]
 pub struct Leaf {
     /// Nothing where no light has arrived yet. Cells that were one share it.
     pub directions: Option<Arc<Quadtree>>,
     /// Probability of the guide.
     pub p_guide: f32,
+    /// Whether all vertices are guided, or [few](super::gain) because little is gained.
+    pub open: bool,
     /// Mean radiance times 4π that arrived.
     pub fluence: f32,
     /// What scattering has brought, for each side that surfaces may face.
     pub outlooks: [Option<Outlook>; SIDES],
 }
 
+impl Default for Leaf {
+    fn default() -> Self {
+        Leaf { directions: None, p_guide: 0.0, open: true, fluence: 0.0, outlooks: [None; SIDES] }
+    }
+}
+
 impl GuideField for Field {
-    fn at<'g>(&'g self, hit: &SurfaceHit, vertex: GuidedVertex, arena: &'g Arena) -> Option<&'g dyn GuidedDirections> {
+    fn at<'g>(&'g self, hit: &SurfaceHit, vertex: GuidedVertex, arena: &'g Arena) -> GuideHere<'g> {
         let index = self.tree.at(hit.p);
         if let Some(apart) = self.apart.get(index) {
-            return self.at_apart((&self.leaves[index], apart), hit, vertex, arena);
+            let here = self.at_apart((&self.leaves[index], apart), hit, vertex, arena);
+            return here.map_or(GuideHere::Unknown, GuideHere::Known);
         }
-        let (tree, p_guide) = self.near.get(index)?;
-        Some(arena.alloc(self.here(tree, p_guide, hit, vertex.one_sided)?))
+        if !self.near.is_open(index) && !gain::is_tried(hit.p) {
+            return GuideHere::Left;
+        }
+        let here = |(tree, p_guide)| self.here(tree, p_guide, hit, vertex.one_sided);
+        self.near.get(index).and_then(here).map_or(GuideHere::Unknown, |here| GuideHere::Known(arena.alloc(here)))
     }
 
     fn sets(&self) -> GuideSets {

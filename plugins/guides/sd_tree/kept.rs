@@ -5,13 +5,14 @@
 //! | `u64`, `u32`, `u16`, `u16` | records taken in, iterations, whether the limit of memory was reached, sets of directions (0: one) |
 //! | | the tree over space: number of nodes, two children each |
 //! | `u32` | trees over directions, then each: number of quads, four `u16` each |
-//! | | cells of space, one more than nodes: which tree over directions (0: none), probability of the guide, fluence, records, the descent that learns the probability, shape of the sums, and the sums unless all are 0, what scattering brings |
+//! | | cells of space, one more than nodes: which tree over directions (0: none), probability of the guide, fluence, records, the descent that learns the probability, shape of the sums, and the sums unless all are 0, what scattering brings, what the guide gains, `u16`: whether all vertices are guided |
 //! | | if there are two sets, what each cell keeps apart: which tree over directions, probability, fluence, records, descent, sums |
 //!
 //! Cells that share a tree over directions still do afterwards.
 
 use super::Settings;
 use super::field::{Field, Leaf};
+use super::gain::Gain;
 use super::learner::{Cell, Learner};
 use super::mixing::Mixing;
 use super::outlook;
@@ -76,6 +77,8 @@ impl Learner {
             let numbers = (number(&cell.directions), leaf.p_guide, cell.fluence, cell.count);
             pack_set(numbers, &cell.mixing, &cell.sums, &mut to);
             outlook::pack(&cell.outlooks, &leaf.outlooks, &mut to);
+            cell.gain.pack(&mut to);
+            to.u16(leaf.open.into());
         }
         for (apart, leaf) in self.apart.iter().zip(&self.field.apart) {
             let numbers = (number(&apart.directions), leaf.p, apart.fluence, apart.count);
@@ -115,8 +118,10 @@ impl Learner {
             let ((tree, p_guide, fluence, count), mixing, sums) = unpack_set(&mut from)?;
             let (directions, p_guide) = (numbered(tree)?, settings.p_guide.unwrap_or(p_guide));
             let (outlooks, known) = outlook::unpack(&mut from)?;
-            leaves.push(Leaf { directions: directions.clone(), p_guide, fluence, outlooks: known });
-            cells.push(Cell { sums, count, mixing, halved: 0, directions, fluence, outlooks });
+            let gain = Gain::unpack(&mut from)?;
+            let open = from.u16("a cell")? != 0 || settings.p_guide.is_some();
+            leaves.push(Leaf { directions: directions.clone(), p_guide, open, fluence, outlooks: known });
+            cells.push(Cell { sums, count, mixing, gain, halved: 0, directions, fluence, outlooks });
         }
         let (mut apart, mut known) = (Vec::new(), Vec::new());
         for _ in (0..tree.leaves()).filter(|_| sets != GuideSets::One) {

@@ -9,7 +9,8 @@
 //! | part of the flux until directions are divided, depth | 0.01, 20 | the same; but not where few records have nearly all of it |
 //! | upper levels of quadtrees | as the flux asks | always three, as a table that the cosine can weight |
 //! | filter of directions | cut off at the edges | goes round in the azimuth, is moved inside at the poles |
-//! | probability of the guide | any | from 0.05 to 0.95 if learnt, at most 0.95 if given |
+//! | probability of the guide | any | from 0.05 to 0.7 if learnt, at most 0.95 if given |
+//! | where the guide gains little | guided all the same | [most vertices](super::gain) are left to the BSDF |
 //! | gradient of that probability | as large as the radiance | over its mean, or the regularisation would depend on it |
 //! | descent: rate, decays, regularisation | 0.01, 0.9 and 0.999, 0.01 | the same |
 //! | light that emitter sampling finds | not learnt, or by its weight | by its weight |
@@ -20,6 +21,7 @@
 
 use super::cylinder;
 use super::field::{Field, Leaf};
+use super::gain::{self, Gain};
 use super::mixing::Mixing;
 use super::outlook::{SIDES, Totals, side};
 use super::prior;
@@ -63,6 +65,7 @@ pub(super) struct Cell {
     /// Records, each counted by the part of it that lies here.
     pub count: f64,
     pub mixing: Mixing,
+    pub gain: Gain,
     /// How often it was halved since its sums were.
     pub halved: u32,
     /// What was learnt before.
@@ -101,21 +104,22 @@ impl Learner {
         const EDGE: u32 = 1 << 20;
         let cell = self.tree.cell(record.p);
         let (leaf, depth) = self.tree.leaf(cell);
+        let whole = if self.field.leaves[leaf as usize].open { 1.0 } else { gain::TRIED as f32 };
         if self.settings.spatial_filter == SpatialFilter::Nearest || depth == 0 {
-            return put(leaf, 1.0);
+            return put(leaf, whole);
         }
         // A box as large as the leaf with the point in its middle, moved into the cube.
         let size = SpatialTree::extent(depth);
         let low = [0, 1, 2].map(|axis: usize| cell[axis].saturating_sub(size[axis] / 2).min(EDGE - size[axis]));
         if self.settings.spatial_filter == SpatialFilter::Box {
-            return self.tree.overlaps(low, size, put);
+            return self.tree.overlaps(low, size, &mut |cell, share| put(cell, share * whole));
         }
         let random = mix(number);
         let jittered = [0, 1, 2].map(|axis: usize| {
             let u = random >> (21 * axis) & 0xf_ffff;
             low[axis] + ((u * u64::from(size[axis])) >> 20) as u32
         });
-        put(self.tree.leaf(jittered).0, 1.0);
+        put(self.tree.leaf(jittered).0, whole);
     }
 
     /// All parts of all records, ordered by cell, then by tile and record.
@@ -187,6 +191,7 @@ impl Learner {
                 apart.push(half);
             }
             cells[old as usize].count *= 0.5;
+            cells[old as usize].gain.fade(0.5);
             cells[old as usize].outlooks.iter_mut().for_each(Totals::halve);
             cells[old as usize].halved += 1;
             let half = cells[old as usize].clone();
@@ -258,6 +263,7 @@ impl GuideLearner for Learner {
                 cell.take(record, f64::from(part.share), filter);
                 if learns_mixing {
                     cell.mixing.step(record);
+                    cell.gain.add(record);
                 }
             }
         });
@@ -289,11 +295,17 @@ impl GuideLearner for Learner {
         self.know_apart();
         self.split(spp);
         self.fade();
-        self.cells.iter_mut().for_each(|cell| cell.count *= self.settings.memory);
+        self.cells.iter_mut().for_each(|cell| {
+            cell.count *= self.settings.memory;
+            cell.gain.fade(self.settings.memory);
+        });
         self.apart.iter_mut().for_each(|apart| apart.count *= self.settings.memory);
+        let least_gain = self.settings.least_gain;
+        let gated = least_gain > 0.0 && p_guide.is_none() && self.apart.is_empty();
         let leaf = |cell: &Cell| Leaf {
             directions: cell.directions.clone(),
             p_guide: p_guide.unwrap_or_else(|| cell.mixing.p_guide()),
+            open: !(gated && cell.gain.is_below(least_gain)),
             fluence: cell.fluence,
             outlooks: std::array::from_fn(|side| cell.outlooks[side].outlook()),
         };

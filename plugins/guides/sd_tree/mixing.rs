@@ -19,6 +19,10 @@ const MOST: f32 = 8.0;
 /// A learnt probability stays within these, so that neither way of sampling is given up.
 pub const LIMITS: (f32, f32) = (0.05, 0.95);
 
+/// The probability of the guide stays below this. More would gain a fifth at best; what the guide has not seen, the BSDF
+/// must find.
+const MOST_LEARNT: f32 = 0.7;
+
 /// The state of the descent in one leaf.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mixing {
@@ -71,7 +75,7 @@ impl Mixing {
 
     /// Probability of the guide.
     pub fn p_guide(&self) -> f32 {
-        (1.0 - self.p()).clamp(LIMITS.0, LIMITS.1)
+        (1.0 - self.p()).clamp(LIMITS.0, MOST_LEARNT)
     }
 
     /// Probability of the first of two sets, given that the direction comes from the guide. Before anything was learnt it
@@ -178,7 +182,8 @@ mod tests {
                 primary: false,
             });
         }
-        mixing.p_guide()
+        assert_eq!(mixing.p_guide(), (1.0 - mixing.p()).clamp(0.05, MOST_LEARNT));
+        1.0 - mixing.p()
     }
 
     /// The mixture can be what is ideal: then p + (1 − p)/10 of the samples are inside.
@@ -296,7 +301,7 @@ mod tests {
         for scattered in [f32::MAX, 1e-38, 0.0] {
             mixing.step(&GuideRecord { scattered, pdf_bsdf: 0.0, ..record });
             mixing.step(&GuideRecord { scattered, pdf_bsdf: 0.0, kind: RecordKind::Mixed, ..record });
-            assert!(mixing.theta.is_finite() && (LIMITS.0..=LIMITS.1).contains(&mixing.p_guide()));
+            assert!(mixing.theta.is_finite() && (LIMITS.0..=MOST_LEARNT).contains(&mixing.p_guide()));
         }
     }
 }

@@ -16,7 +16,8 @@
 //! | `memory` | float | 0.5 | part of what was found that still counts an iteration later; 0 as published |
 //! | `spatial_filter` | string | stochastic | records go to the cell they lie in (`nearest`), to one in a box about it (`stochastic`), or to all of the `box` by volume |
 //! | `directional_filter` | string | box | records go to the directions they lie in (`nearest`), or to all in a `box` about them by area |
-//! | `p_guide` | float | unset | probability of the guide, limited to 0.95; learnt if unset |
+//! | `p_guide` | float | unset | probability of the guide, limited to 0.95; learnt if unset, up to 0.7 |
+//! | `least_gain` | float | 0.05 | where the mixture is closer than the BSDF alone to the light that is scattered by less than so many nats (divergence of Kullback and Leibler), three vertices in four are left to the BSDF; 0: all are guided. Only where `p_guide` is learnt and `sets` is `one` |
 //! | `product` | string | cosine | what the guide follows: `none`, the light alone; `cosine`, its product with the cosine, for BSDFs that reflect only; `resampling`, its product with any BSDF, by a choice among candidates |
 //! | `candidates` | integer | 2 | for `resampling`: directions drawn at a vertex, of which one is followed |
 //! | `sets` | string | one | sets of directions in each cell of space: `one`; `direct_indirect`, one for light of emitters that a scattered ray runs into and one for all other light, whose mixture is learnt; `primary_product`, one for what first hits scatter towards the camera (light times BSDF times cosine) and one for light that arrives at later vertices |
@@ -58,6 +59,7 @@
 
 mod cylinder;
 mod field;
+mod gain;
 mod kept;
 mod learner;
 mod mixing;
@@ -95,6 +97,8 @@ pub const PLUGIN: Plugin = Plugin {
         Param::choice("spatial_filter", &["nearest", "stochastic", "box"], "stochastic", "cells a record goes to"),
         Param::choice("directional_filter", &["nearest", "box"], "box", "directions a record goes to"),
         Param::float_opt("p_guide", "probability of the guide; learnt if unset").range(0.0, 1.0),
+        Param::float("least_gain", 0.05, "nats that the guide must gain, or most vertices are left to the BSDF")
+            .range(0.0, 1e3),
         Param::choice(
             "product",
             &["none", "cosine", "resampling"],
@@ -150,6 +154,8 @@ struct Settings {
     spatial_filter: SpatialFilter,
     directional_filter: DirectionalFilter,
     p_guide: Option<f32>,
+    /// What the guide must gain over the BSDF where all vertices are guided, in nats; 0 if they are everywhere.
+    least_gain: f64,
     cosine: bool,
     max_bytes: usize,
     /// What each cell keeps apart.
@@ -178,6 +184,7 @@ fn build(p: &Properties<'_>) -> Built<dyn Guide> {
             _ => DirectionalFilter::Box,
         },
         p_guide: p.float_opt("p_guide").map(|p| p.min(MOST_GUIDED)),
+        least_gain: p.double("least_gain"),
         cosine: p.choice("product") != "none",
         max_bytes: (p.double("max_memory") * f64::from(1 << 20)) as usize,
         sets: sets::of_name(p.choice("sets")),
@@ -238,6 +245,7 @@ pub(crate) fn outlook_alone() -> Arc<dyn Guide> {
         spatial_filter: SpatialFilter::Nearest,
         directional_filter: DirectionalFilter::Nearest,
         p_guide: Some(0.0),
+        least_gain: 0.0,
         prior: 0.0,
         memory: 0.0,
         cosine: false,

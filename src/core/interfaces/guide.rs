@@ -167,8 +167,8 @@ pub enum FactValue {
 
 /// What has been learnt.
 pub trait GuideField: Send + Sync {
-    /// The directions learnt where a path is scattered; `None` where nothing is known.
-    fn at<'g>(&'g self, hit: &SurfaceHit, vertex: GuidedVertex, arena: &'g Arena) -> Option<&'g dyn GuidedDirections>;
+    /// The directions learnt where a path is scattered.
+    fn at<'g>(&'g self, hit: &SurfaceHit, vertex: GuidedVertex, arena: &'g Arena) -> GuideHere<'g>;
 
     /// Which sets of directions it has: what records must tell it.
     fn sets(&self) -> GuideSets {
@@ -189,6 +189,28 @@ pub trait GuideField: Send + Sync {
     /// # Errors
     /// What does not hold.
     fn validate(&self) -> std::result::Result<(), String>;
+}
+
+/// What a field tells about a vertex.
+#[derive(Clone, Copy)]
+pub enum GuideHere<'g> {
+    /// Nothing is known yet.
+    Unknown,
+    /// The BSDF does as well alone, and nothing needs to be recorded.
+    Left,
+    /// The directions learnt.
+    Known(&'g dyn GuidedDirections),
+}
+
+impl<'g> GuideHere<'g> {
+    /// The directions, if there are any.
+    #[inline]
+    pub fn known(self) -> Option<&'g dyn GuidedDirections> {
+        match self {
+            GuideHere::Known(directions) => Some(directions),
+            GuideHere::Unknown | GuideHere::Left => None,
+        }
+    }
 }
 
 /// The sets of directions that a field has at each place.

@@ -106,6 +106,8 @@ pub(super) fn guided_path(editor: &mut Editor, node: NodeId) -> Option<String> {
     editor.set(guide, "combination", text(if combination == "inversevar" { "inverse_variance" } else { "last" }));
     if loss == "none" {
         editor.set(guide, "p_guide", Value::Float(1.0 - p_bsdf));
+    } else {
+        editor.set(guide, "least_gain", Value::Float(0.0));
     }
     // It compares with the number times the square root of a quarter of the samples per pixel.
     editor.set(guide, "spatial_threshold", Value::Float(0.5 * spatial_threshold));

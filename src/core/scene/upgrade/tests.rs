@@ -69,7 +69,8 @@ fn guided_path_with_all_its_parameters() {
              <boolean name='hide_emitters' value='true'/><float name='timeout' value='60'/>\
              <guide name='_guide' type='sd_tree'><string name='nee' value='kickstart'/>\
              <string name='spatial_filter' value='stochastic'/><string name='directional_filter' value='box'/>\
-             <string name='combination' value='inverse_variance'/><float name='spatial_threshold' value='2000'/>\
+             <string name='combination' value='inverse_variance'/><float name='least_gain' value='0'/>\
+             <float name='spatial_threshold' value='2000'/>\
              <float name='directional_threshold' value='0.02'/><float name='max_memory' value='32'/>\
              <boolean name='direct' value='false'/><integer name='startup' value='0'/><string name='product' value='none'/>\
              <float name='roughness_threshold' value='0'/></guide></integrator>",
