@@ -167,6 +167,97 @@ fn a_trained_field_knows_where_the_light_is() {
     assert!(sky > 0.2 && sky < 0.45, "{sky}");
 }
 
+/// A direction of the distribution of von Mises and Fisher about `axis`, and its density. In f64, by what the cosine lacks
+/// to 1: then no κ is too large or too small.
+fn vmf(axis: Vec3, kappa: f64, u: Vec2) -> (Vec3, f32) {
+    let decay = -(-2.0 * kappa).exp_m1();
+    let lacks = if kappa < 1e-3 { 2.0 * f64::from(u.x) } else { -(-f64::from(u.x) * decay).ln_1p() / kappa };
+    let lacks = lacks.clamp(0.0, 2.0);
+    let sin = (lacks * (2.0 - lacks)).sqrt() as f32;
+    let (y, x) = (2.0 * PI * u.y).sin_cos();
+    let d = Frame::from_normal(axis).to_world(Vec3::new(sin * x, sin * y, (1.0 - lacks) as f32));
+    let norm = if kappa < 1e-3 { 1.0 / (4.0 * PI) } else { (kappa / (f64::from(2.0 * PI) * decay)) as f32 };
+    (d, norm * (-kappa * lacks).exp() as f32)
+}
+
+/// What guides of lobes must stand, for a tree: light of lobes from all directions alike to nearly one, many equal lobes, and
+/// none. The density is bounded by the depth: 4^depth/4π.
+#[test]
+fn hc_p03_lobes_of_any_width_are_learnt() {
+    const RECORDS: usize = 20_000;
+    let known_from = |lobes: &[Vec3], kappa: f64, radiance: f32, depth: u32| {
+        let guide =
+            guide(&format!("<string name='product' value='none'/><integer name='directional_depth' value='{depth}'/>"));
+        let (mut learner, mut pcg) = (guide.start(UNIT), Pcg32::new(11, 11));
+        for _ in 0..6 {
+            let lobe = |i: usize| lobes[i % lobes.len()];
+            let records = (0..RECORDS).map(|i| {
+                let (d, pdf) = vmf(lobe(i), kappa, random(&mut pcg));
+                record(Vec3::splat(0.5), d, radiance * pdf, pdf)
+            });
+            learner.learn(&[records.filter(|r| r.pdf > 0.0).collect()]);
+            learner.refine(1);
+        }
+        learner.field().validate().expect("the field is sound");
+        learner.field()
+    };
+    let vertex = hit(Vec3::splat(0.5), Vec3::Z);
+    let axis = Vec3::new(0.36, 0.48, -0.8);
+    let mut peaks = Vec::new();
+    for kappa in [0.0, 1e-6, 1e4, 1e8] {
+        let arena = Arena::new();
+        let coarse = known_from(&[axis], kappa, 1.0, 5);
+        let directions = coarse.at(&vertex, REFLECTS, &arena).known().expect("something was learnt");
+        let integral: f64 = expected(directions).iter().sum();
+        assert!((integral - 1.0).abs() < 1e-3, "{kappa}: {integral}");
+        let fine = known_from(&[axis], kappa, 1.0, 20);
+        let directions = fine.at(&vertex, REFLECTS, &arena).known().expect("something was learnt");
+        let (mut pcg, mut cosine) = (Pcg32::new(12, 12), 0.0);
+        for _ in 0..RECORDS {
+            let (d, pdf) = directions.sample(random(&mut pcg));
+            assert!(pdf > 0.0 && f64::from(pdf) <= 4f64.powi(20) / (4.0 * std::f64::consts::PI), "{kappa}: {pdf}");
+            cosine += f64::from(d.dot(axis)) / RECORDS as f64;
+        }
+        // Of the distribution: coth κ − 1/κ. A part of the tree stays even, and cells have a size.
+        let exact = if kappa < 1.0 { 0.0 } else { 1.0 - 1.0 / kappa };
+        assert!((cosine - exact).abs() < 0.02, "{kappa}: {cosine}");
+        peaks.push(directions.pdf(axis));
+    }
+    let even = 1.0 / (4.0 * PI);
+    assert!(peaks[..2].iter().all(|peak| (0.5..2.0).contains(&(peak / even))), "{peaks:?}");
+    assert!(peaks[2] > 300.0 && peaks[3] > 100.0 * peaks[2], "{peaks:?}");
+    // Equal lobes, spread evenly: each gets from half to twice its part, as the tree does not divide what is below a
+    // hundredth of the flux.
+    let lobes: Vec<Vec3> = (0..64)
+        .map(|i| {
+            let z = 1.0 - (i as f32 + 0.5) / 32.0;
+            let (y, x) = (2.4 * i as f32).sin_cos();
+            Vec3::new((1.0 - z * z).sqrt() * x, (1.0 - z * z).sqrt() * y, z)
+        })
+        .collect();
+    let (field, arena, mut pcg) = (known_from(&lobes, 1e4, 1.0, 20), Arena::new(), Pcg32::new(13, 13));
+    let directions = field.at(&vertex, REFLECTS, &arena).known().expect("something was learnt");
+    let mut counts = vec![0; lobes.len()];
+    for _ in 0..64 * 500 {
+        let (d, _) = directions.sample(random(&mut pcg));
+        let nearest = (0..lobes.len()).max_by(|a, b| d.dot(lobes[*a]).total_cmp(&d.dot(lobes[*b])));
+        counts[nearest.expect("there are lobes")] += 1;
+    }
+    assert!(counts.iter().all(|count| (250..1000).contains(count)), "{counts:?}");
+    // No light from any of them.
+    let arena = Arena::new();
+    assert!(known_from(&lobes, 1e4, 0.0, 20).at(&vertex, REFLECTS, &arena).known().is_none());
+    measured(
+        "hc_p03_lobes_of_any_width_are_learnt",
+        format!(
+            "densities at the peak {} for κ = 0, 1e-6, 1e4, 1e8; 64 equal lobes get {} to {} of 32000 samples",
+            peaks.iter().map(|peak| format!("{peak:.2e}")).collect::<Vec<_>>().join(", "),
+            counts.iter().min().expect("lobes"),
+            counts.iter().max().expect("lobes")
+        ),
+    );
+}
+
 #[test]
 fn hc_p02_records_of_nothing_and_of_extremes_leave_a_sound_field() {
     let at = |p: Vec3, radiance: f32| record(p, Vec3::Z, radiance, 1.0);

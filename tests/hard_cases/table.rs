@@ -115,6 +115,11 @@ const CASES: &[Case] = &[
     ("i22", "files of what was learnt and of where a run stands: damaged, of another scene or run: errors", "has none"),
     ("p01", "what a guide has learnt, in 100 cells, and its mixture with BSDFs: samples as dense as told", "-"),
     ("p02", "records of nothing, of one, of zeros, of 1e30, of one direction: a sound field", "-"),
+    (
+        "p03",
+        "light of lobes from even to 1e8 times as narrow, of 64 lobes, of none: densities that integrate to one",
+        "-",
+    ),
     ("p04", "positions at 1e18, all in one point: splits end, every point has a leaf", "-"),
     ("p05", "a path of 1000 vertices: all are noted, with the light behind them", "-"),
     ("p06", "guided against not, trained and corrupted, probability 0 and 1: equal means", "-"),

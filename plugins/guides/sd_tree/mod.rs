@@ -46,6 +46,10 @@
 //! both filters `nearest`, `p_guide` 0.5, `product` `none`, `startup` 0 and `combination` `last` are nearly the form of
 //! 2017.
 //!
+//! Samples are never clamped, guided or not. A limit to what a sample may count would take more light where the guide knows
+//! little than where it knows much, and leave patches along the edges of its cells, most of all in shadows. More samples,
+//! or `p_guide` at 0.5, are what there is against bright dots.
+//!
 //! Paths go by the roulette `adjoint` unless another is named: from what this tree has learnt they end early where little
 //! light is ahead, and split where much is.
 //!
