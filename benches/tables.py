@@ -3,6 +3,7 @@ import csv
 import sys
 from pathlib import Path
 
+SPEED = "speed of Lucerna over that of the other"
 NEEDED = "pictures need the Python package matplotlib: pip install matplotlib"
 
 
@@ -22,7 +23,7 @@ def check_arguments(arguments):
             sys.exit(NEEDED)
 
 
-def report(arguments, text, rows, title, groups):
+def report(arguments, text, rows, title, groups, axis=SPEED):
     """Prints the table `text`, and writes what the options ask for: it, the `rows` as CSV, and a picture of `groups`."""
     print(text, end="")
     if arguments.markdown:
@@ -30,7 +31,7 @@ def report(arguments, text, rows, title, groups):
     if arguments.csv:
         write_csv(arguments.csv, rows)
     if arguments.plot:
-        plot_ratios(arguments.plot, title, groups)
+        plot_ratios(arguments.plot, title, groups, axis)
 
 
 def write_csv(path, rows):
@@ -41,7 +42,7 @@ def write_csv(path, rows):
         writer.writerows(rows)
 
 
-def plot_ratios(path, title, groups):
+def plot_ratios(path, title, groups, axis):
     """Ratios as dots with a line from least to largest.
 
     `groups` maps the name of a series to rows `(label, median, least, largest)`, the same labels for each.
@@ -60,13 +61,13 @@ def plot_ratios(path, title, groups):
         axes.errorbar(middle, place, xerr=ends, fmt="o", capsize=3, markersize=5, label=name)
     axes.axvline(1.0, color="black", linewidth=0.8)
     axes.set_xscale("log")
-    ticks = [t for t in (0.1, 0.2, 0.5, 0.7, 1, 1.5, 2, 3, 5, 10, 20, 50) if axes.get_xlim()[0] <= t <= axes.get_xlim()[1]]
+    ticks = [t for t in (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 0.7, 1, 1.5, 2, 3, 5, 10, 20, 50) if axes.get_xlim()[0] <= t <= axes.get_xlim()[1]]
     axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
     axes.minorticks_off()
     axes.set_yticks(range(len(labels)), labels)
     axes.set_ylim(len(labels) - 0.5, -0.5)
     axes.grid(axis="x", alpha=0.3)
-    axes.set_xlabel("speed of Lucerna over that of the other")
+    axes.set_xlabel(axis)
     axes.set_title(title, fontsize=10)
     axes.legend(loc="best", fontsize=8)
     figure.savefig(path, dpi=120)

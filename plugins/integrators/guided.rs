@@ -4,8 +4,8 @@
 use super::directions::{Directions, Step, Unguided};
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{
-    Arena, Bxdf, BxdfSample, Goal, GuideHere, GuideSets, GuidedDirections, GuidedVertex, Lobes, MOST_GUIDED, Outlook,
-    RecordKind, SurfaceHit, Transport, is_guided,
+    Arena, Bxdf, BxdfSample, Goal, GuideSets, GuidedDirections, GuidedVertex, Lobes, MOST_GUIDED, Outlook, RecordKind,
+    SurfaceHit, Transport, is_guided,
 };
 use lucerna_core::math::{ONE_MINUS_EPSILON, Vec2, Vec3};
 use lucerna_core::render::{Guidance, Notebook, Place, Scattering};
@@ -53,14 +53,12 @@ impl<'a> Directions for Guided<'a> {
             return Learnt { guide: None, teaches: false, hybrid, primary, follows_product: false };
         }
         let vertex = GuidedVertex { one_sided: lobes.is_one_sided(), primary };
-        let known = self.guidance.field.at(hit, vertex, self.arena);
-        let guide = known.known().and_then(|guide| {
+        let guide = self.guidance.field.at(hit, vertex, self.arena).and_then(|guide| {
             let p = guide.p_guide().clamp(0.0, MOST_GUIDED);
             (p > 0.0).then_some((guide, p))
         });
-        let teaches = !matches!(known, GuideHere::Left);
         let follows_product = primary && self.guidance.sets == GuideSets::PrimaryProduct;
-        Learnt { guide, teaches, hybrid, primary, follows_product }
+        Learnt { guide, teaches: true, hybrid, primary, follows_product }
     }
 
     #[inline]

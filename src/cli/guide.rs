@@ -157,6 +157,9 @@ fn view(registry: &Registry, arguments: &ViewArguments) -> Result<ExitCode, Fail
     let (learnt, guide) = read(registry, &arguments.guide_file)?;
     let learner = learnt.recall(&*guide, scene.accel().bounds()).map_err(|e| at(&arguments.guide_file, e))?;
     let field = learner.field();
+    if !field.guides() {
+        println!("paths are left to the BSDF, since the guide gains little; what it has learnt is shown");
+    }
     let least_roughness = guide.training().least_roughness;
     let learned = Learned { scene: &scene, sensor: &*camera.sensor, size, field: &*field, least_roughness };
     let places: Vec<Place> = pixels.into_iter().map(|pixel| learned.look(pixel)).collect();

@@ -2,7 +2,7 @@
 
 use super::cone;
 use lucerna::core::interfaces::{
-    Arena, Guide, GuideField, GuideHere, GuideLearner, GuideRecord, GuideSets, GuidedDirections, GuidedVertex, Outlook,
+    Arena, Guide, GuideField, GuideLearner, GuideRecord, GuideSets, GuidedDirections, GuidedVertex, Outlook,
     SurfaceHit, Training, VertexRecord, mix,
 };
 use lucerna::core::math::{Aabb, Vec2, Vec3};
@@ -128,14 +128,13 @@ fn key(p: Vec3) -> u64 {
 }
 
 impl GuideField for Field {
-    fn at<'g>(&'g self, hit: &SurfaceHit, vertex: GuidedVertex, arena: &'g Arena) -> GuideHere<'g> {
+    fn at<'g>(&'g self, hit: &SurfaceHit, vertex: GuidedVertex, arena: &'g Arena) -> Option<&'g dyn GuidedDirections> {
         if self.spoils.way == "empty" {
-            return GuideHere::Unknown;
+            return None;
         }
-        let here = self.inner.at(hit, vertex, arena);
-        let Some(inner) = here.known() else { return here };
+        let inner = self.inner.at(hit, vertex, arena)?;
         let p_guide = self.spoils.p_guide.unwrap_or_else(|| inner.p_guide());
-        GuideHere::Known(arena.alloc(Spoilt { inner, way: &self.spoils.way, p_guide, key: key(hit.p) }))
+        Some(arena.alloc(Spoilt { inner, way: &self.spoils.way, p_guide, key: key(hit.p) }))
     }
 
     fn sets(&self) -> GuideSets {

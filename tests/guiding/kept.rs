@@ -14,8 +14,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-/// A guide with small cells, so that there are many.
-const GUIDED: &str = "<guide type='sd_tree'><float name='spatial_threshold' value='100'/></guide>";
+/// A guide with small cells, so that there are many, and several iterations.
+const GUIDED: &str =
+    "<guide type='sd_tree'><float name='spatial_threshold' value='100'/><float name='learning' value='0.4'/></guide>";
 /// Goes by estimates of pixels and by what scattering brings, and splits often.
 const ADJOINT: &str = "<roulette type='adjoint'><float name='window' value='1'/></roulette>";
 
@@ -191,7 +192,7 @@ fn damaged(sets: &str, versions: usize) -> usize {
         let (field, arena) = (recalled.field(), Arena::new());
         for p in [Vec3::splat(0.1), Vec3::new(0.9, 0.5, 0.2)] {
             if let Some(directions) =
-                field.at(&hit(p, Vec3::Z), GuidedVertex { primary: version % 2 == 0, ..REFLECTS }, &arena).known()
+                field.at(&hit(p, Vec3::Z), GuidedVertex { primary: version % 2 == 0, ..REFLECTS }, &arena)
             {
                 let (d, pdf) = directions.sample(Vec2::new(0.3, 0.8));
                 assert!(d.is_finite() && pdf >= 0.0, "{version}: {d} {pdf}");

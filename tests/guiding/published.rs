@@ -22,12 +22,13 @@ const SEEDS: u32 = 10;
 /// Samples per pixel of each; of `path` four times as many.
 const SPP: u32 = 64;
 
-/// All combinations of a guide or none, a roulette and a light sampler. The first is `path` itself and left out: without a
+/// All combinations of a guide or none, a roulette and a light sampler; guided to the end, in several iterations. The first is `path` itself and left out: without a
 /// guide its throughput is what the roulette `albedo` goes by.
 fn methods() -> Vec<Method> {
     let mut names = Vec::new();
-    let sets = ["direct_indirect", "primary_product"].map(|sets| format!("+guide=sd_tree:sets={sets}"));
-    for guide in ["", "+guide=sd_tree", &sets[0], &sets[1]] {
+    let sets = ["one", "direct_indirect", "primary_product"];
+    let guides = sets.map(|sets| format!("+guide=sd_tree:least_gain=0,learning=0.4,sets={sets}"));
+    for guide in ["", &guides[0], &guides[1], &guides[2]] {
         for roulette in ["+roulette=albedo", "+roulette=adjoint"] {
             for lights in ["", "+light_sampler=power", "+light_sampler=light_tree", "+light_sampler=ris"] {
                 names.push(format!("{PATH}{guide}{roulette}{lights}"));

@@ -86,7 +86,7 @@ const LEARNT: [&str; 2] = ["adjoint", "efficiency"];
 
 #[test]
 fn roulette_by_what_was_learnt_is_unbiased() {
-    let guide = "<guide type='sd_tree'><float name='spatial_threshold' value='200'/></guide>";
+    let guide = "<guide type='sd_tree'><float name='spatial_threshold' value='200'/><float name='learning' value='0.4'/></guide>";
     let mut ways: Vec<String> = LEARNT.iter().map(|name| format!("<roulette type='{name}'/>")).collect();
     ways.push("<roulette type='adjoint'><float name='window' value='1'/></roulette>".to_owned());
     ways.extend(["throughput", "adjoint", "efficiency"].map(|name| format!("{guide}<roulette type='{name}'/>")));
@@ -190,7 +190,7 @@ fn paths_end_and_split() {
 
 #[test]
 fn the_number_of_threads_changes_no_bit() {
-    let guide = "<guide type='sd_tree'><float name='spatial_threshold' value='100'/></guide>";
+    let guide = "<guide type='sd_tree'><float name='spatial_threshold' value='100'/><float name='learning' value='0.4'/></guide>";
     for name in LEARNT {
         for guide in ["", guide] {
             let picture = |threads: usize| {
@@ -214,7 +214,7 @@ fn the_number_of_threads_changes_no_bit() {
 /// What is there without a roulette, under its name.
 #[test]
 fn throughput_and_adjoint_are_the_defaults() {
-    let guide = "<guide type='sd_tree'><float name='spatial_threshold' value='100'/></guide>";
+    let guide = "<guide type='sd_tree'><float name='spatial_threshold' value='100'/><float name='learning' value='0.4'/></guide>";
     let data = |more: &str| render(&scene(SCENES[1].1, &path(30, more)), 24, 1, SampleOrder::PerSample).0.data;
     assert!(data("") == data("<roulette type='throughput'/>"));
     assert!(data("") == data("<roulette type='albedo'/>"));

@@ -52,8 +52,10 @@ pub fn agree(scenes: &[(&str, &str)], guides: &[String], depth: u32, spp: u32) -
 
 #[test]
 fn hc_p06_every_setting_of_the_tree_is_unbiased() {
-    let small = "<float name='spatial_threshold' value='200'/>";
-    let guide = |more: &str| format!("<guide type='sd_tree'>{small}{more}</guide>");
+    // Many cells, several iterations, and guided to the end.
+    let small = "<float name='spatial_threshold' value='200'/><float name='learning' value='0.4'/>";
+    let guide = |more: &str| format!("<guide type='sd_tree'>{small}<float name='least_gain' value='0'/>{more}</guide>");
+    let left = format!("<guide type='sd_tree'>{small}<float name='least_gain' value='20'/></guide>");
     let guides = [
         guide(""),
         guide("<string name='nee' value='never'/>"),
@@ -61,7 +63,7 @@ fn hc_p06_every_setting_of_the_tree_is_unbiased() {
         guide("<string name='product' value='none'/><string name='spatial_filter' value='box'/>"),
         guide("<float name='roughness_threshold' value='0'/><string name='combination' value='last'/>"),
         guide("<float name='p_guide' value='0'/>"),
-        guide("<float name='least_gain' value='20'/>"),
+        left,
         guide("<float name='prior' value='0'/><float name='memory' value='0'/>"),
         guide("<string name='product' value='resampling'/>"),
         guide("<string name='sets' value='direct_indirect'/>"),

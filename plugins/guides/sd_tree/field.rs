@@ -1,15 +1,12 @@
 //! What has been learnt, to be sampled.
 
 use super::cylinder;
-use super::gain;
 use super::near::Near;
 use super::outlook::{SIDES, side};
 use super::quadtree::{CELLS, EDGE, Quads, Quadtree, UNIFORM, long};
 use super::sets::{ApartLeaf, is_lit};
 use super::spatial::SpatialTree;
-use lucerna_core::interfaces::{
-    Arena, GuideField, GuideHere, GuideSets, GuidedDirections, GuidedVertex, Outlook, SurfaceHit,
-};
+use lucerna_core::interfaces::{Arena, GuideField, GuideSets, GuidedDirections, GuidedVertex, Outlook, SurfaceHit};
 use lucerna_core::math::{Vec2, Vec3};
 use std::f32::consts::PI;
 use std::sync::{Arc, LazyLock};
@@ -18,6 +15,8 @@ use std::sync::{Arc, LazyLock};
 pub struct Field {
     pub tree: SpatialTree,
     pub leaves: Vec<Leaf>,
+    /// Whether paths are guided: [more is gained](super::gain) than it costs, or it is not known yet.
+    pub guides: bool,
     /// Whether directions are weighted by the cosine at the vertex.
     pub cosine: bool,
     /// Whether something is kept apart,
@@ -29,38 +28,30 @@ pub struct Field {
 }
 
 /// What is known in a cell of space.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub struct Leaf {
     /// Nothing where no light has arrived yet. Cells that were one share it.
     pub directions: Option<Arc<Quadtree>>,
     /// Probability of the guide.
     pub p_guide: f32,
-    /// Whether all vertices are guided, or [few](super::gain) because little is gained.
-    pub open: bool,
     /// Mean radiance times 4π that arrived.
     pub fluence: f32,
     /// What scattering has brought, for each side that surfaces may face.
     pub outlooks: [Option<Outlook>; SIDES],
 }
 
-impl Default for Leaf {
-    fn default() -> Self {
-        Leaf { directions: None, p_guide: 0.0, open: true, fluence: 0.0, outlooks: [None; SIDES] }
-    }
-}
-
 impl GuideField for Field {
-    fn at<'g>(&'g self, hit: &SurfaceHit, vertex: GuidedVertex, arena: &'g Arena) -> GuideHere<'g> {
+    fn at<'g>(&'g self, hit: &SurfaceHit, vertex: GuidedVertex, arena: &'g Arena) -> Option<&'g dyn GuidedDirections> {
         let index = self.tree.at(hit.p);
         if let Some(apart) = self.apart.get(index) {
-            let here = self.at_apart((&self.leaves[index], apart), hit, vertex, arena);
-            return here.map_or(GuideHere::Unknown, GuideHere::Known);
+            return self.at_apart((&self.leaves[index], apart), hit, vertex, arena);
         }
-        if !self.near.is_open(index) && !gain::is_tried(hit.p) {
-            return GuideHere::Left;
-        }
-        let here = |(tree, p_guide)| self.here(tree, p_guide, hit, vertex.one_sided);
-        self.near.get(index).and_then(here).map_or(GuideHere::Unknown, |here| GuideHere::Known(arena.alloc(here)))
+        let (tree, p_guide) = self.near.get(index)?;
+        Some(arena.alloc(self.here(tree, p_guide, hit, vertex.one_sided)?))
+    }
+
+    fn guides(&self) -> bool {
+        self.guides
     }
 
     fn sets(&self) -> GuideSets {
@@ -117,7 +108,7 @@ impl Field {
     /// What is known in the leaves of a tree over space.
     pub fn new(tree: SpatialTree, leaves: Vec<Leaf>, cosine: bool, sets: GuideSets, apart: Vec<ApartLeaf>) -> Self {
         let near = if apart.is_empty() { Near::new(&leaves) } else { Near::default() };
-        Field { tree, leaves, cosine, sets, apart, near }
+        Field { tree, leaves, guides: true, cosine, sets, apart, near }
     }
 
     /// A tree of a leaf at a vertex.

@@ -1,25 +1,23 @@
-//! Where a guide gains too little over the BSDF to be worth its time.
+//! Whether a guide gains enough over the BSDF to be worth its time.
 //!
 //! The measure is the divergence that the [probability of the guide](super::mixing) is learnt by (Müller 2019, section
 //! 10.5): by how much the mixture q of guide and BSDF is closer, in the sense of Kullback and Leibler, to the light p that
 //! is scattered than the BSDF b alone is, ∫p log(q/b) in nats. Being a mean of logarithms it is known from few records,
-//! where the variances themselves drown in the noise of what lies further along the path.
+//! where the variances themselves drown in the noise of what lies further along the path. It is taken in each cell of
+//! space by the light there, and then over all cells by their records, so that dark places count as bright ones.
 //!
-//! In a cell where it is low most vertices are left to the BSDF, and record nothing. The rest are guided as ever, and
-//! their records count for all, so that the cell finds out when it was wrong. Which ones is decided by their position
-//! alone: it is the same for sampling and densities, so that no picture is biased.
+//! At 96×54 pixels, once eight samples per pixel are learnt from, scenes that are lit through a door ajar, by a sky through
+//! windows, or by lamps behind glass had 0.15 to 0.8 nats, and gained from being guided (by all of the relative error in
+//! the same time). A room with one window, a stairway, a class room, a bath room, and the Cornell box had less than 0.08.
+//! There variance fell too, but not by as much as samples became dearer.
 
-use lucerna_core::interfaces::{GuideRecord, RecordKind, mix};
+use lucerna_core::interfaces::{GuideRecord, RecordKind};
 use lucerna_core::io::limits::Cursor;
 use lucerna_core::io::sealed::Packer;
 use lucerna_core::io::{IoError, Result};
-use lucerna_core::math::Vec3;
 
-/// One vertex in so many is guided where the gain is low.
-pub const TRIED: u32 = 4;
-
-/// Records from which the gain is believed.
-const ENOUGH: f64 = 1000.0;
+/// Records of all cells together from which the mean gain is believed.
+const ENOUGH: f64 = 20_000.0;
 
 /// One record tells at most this: light where the BSDF alone would never have looked.
 const MOST: f32 = 20.0;
@@ -55,9 +53,9 @@ impl Gain {
         }
     }
 
-    /// Whether it is known to be less than so many nats.
-    pub fn is_below(&self, least: f64) -> bool {
-        self.count >= ENOUGH && self.sum < least * self.light
+    /// In nats; 0 where no light was scattered.
+    fn nats(&self) -> f64 {
+        if self.light > 0.0 { self.sum / self.light } else { 0.0 }
     }
 
     /// Writes it.
@@ -80,15 +78,16 @@ impl Gain {
     }
 }
 
-/// Whether a vertex is guided where few are.
-#[inline]
-pub fn is_tried(p: Vec3) -> bool {
-    let [x, y, z] = p.to_array().map(|x| u64::from(x.to_bits()));
-    mix(x ^ y << 32 ^ mix(z)).is_multiple_of(u64::from(TRIED))
+/// The mean over the records of all cells, in nats, if they are enough to tell.
+pub fn mean<'a>(cells: impl Iterator<Item = &'a Gain>) -> Option<f64> {
+    let (sum, count) =
+        cells.fold((0.0, 0.0), |(sum, count), gain| (sum + gain.count * gain.nats(), count + gain.count));
+    (count >= ENOUGH).then_some(sum / count)
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::mixing::tests::found_in_a_part;
     use super::*;
     use lucerna_core::sampling::Pcg32;
 
@@ -97,27 +96,7 @@ mod tests {
     fn gain(part: f32, records: u32) -> Gain {
         let (mut gain, mut pcg) = (Gain::default(), Pcg32::new(3, 3));
         for _ in 0..records {
-            let (choice, x) = (pcg.next_f32(), pcg.next_f32());
-            let x = if choice < 0.5 { part * x } else { x };
-            let pdf_guide = if x < part { 1.0 / part } else { 0.0 };
-            let pdf = 0.5 * pdf_guide + 0.5;
-            let radiance = if x < part { 1.0 / part } else { 0.0 };
-            let (scattered, kind) = (radiance / pdf, RecordKind::Mixed);
-            let (p, d, direct, primary) = (Vec3::ZERO, Vec3::Z, 0.0, false);
-            let (pdf_bsdf, pdf_sets) = (1.0, [0.0; 2]);
-            gain.add(&GuideRecord {
-                p,
-                d,
-                radiance,
-                direct,
-                scattered,
-                pdf,
-                pdf_bsdf,
-                pdf_guide,
-                pdf_sets,
-                kind,
-                primary,
-            });
+            gain.add(&found_in_a_part(0.5, part, 1.0, &mut pcg));
         }
         gain
     }
@@ -126,56 +105,28 @@ mod tests {
     #[test]
     fn gains_are_those_in_closed_form() {
         for part in [1.0, 0.5, 0.1, 0.01] {
-            let (gain, exact) = (gain(part, 20_000), f64::from(0.5 / part + 0.5).ln());
-            assert!(gain.is_below(1.001 * exact + 1e-6) && !gain.is_below(0.999 * exact - 1e-6), "{part}: {gain:?}");
+            let (found, exact) = (mean([gain(part, 20_000)].iter()), f64::from(0.5 / part + 0.5).ln());
+            assert!(found.is_some_and(|found| (found - exact).abs() < 1e-3 * exact + 1e-6), "{part}: {found:?}");
         }
+    }
+
+    /// Cells count by their records, whatever light they have; those without any gain nothing.
+    #[test]
+    fn dark_cells_count_as_bright_ones() {
+        let (some, none) = (gain(0.1, 20_000), gain(1.0, 20_000));
+        let bright = Gain { light: 1e6 * none.light, sum: 1e6 * none.sum, ..none };
+        let found = mean([some, bright, Gain { count: 10_000.0, ..Gain::default() }].iter());
+        let exact = 0.4 * 5.5_f64.ln();
+        assert!(found.is_some_and(|found| (found - exact).abs() < 1e-3), "{found:?}");
     }
 
     #[test]
     fn few_records_say_nothing() {
-        assert!(!gain(1.0, 999).is_below(0.1) && gain(1.0, 1000).is_below(0.1));
-        let mut half = gain(1.0, 1000);
+        assert!(mean([gain(1.0, 19_999)].iter()).is_none() && mean([gain(1.0, 20_000)].iter()).is_some());
+        let mut half = gain(1.0, 20_000);
         half.fade(0.5);
-        assert!(!half.is_below(0.1));
-        assert!(!Gain::default().is_below(1.0));
-    }
-
-    /// As many as should be, of points anywhere, on planes and on lines, also where coordinates are round numbers.
-    #[test]
-    fn one_vertex_in_so_many_is_tried() {
-        const POINTS: u32 = 1 << 14;
-        let mut pcg = Pcg32::new(5, 5);
-        let mut u = || pcg.next_f32();
-        let points: [&mut dyn FnMut() -> Vec3; 4] = [
-            &mut || 2.0 * Vec3::new(u(), u(), u()) - 1.0,
-            &mut {
-                let mut i = 0.0;
-                move || {
-                    i += 1.0;
-                    Vec3::new(i / 128.0, 0.0, 1.0)
-                }
-            },
-            &mut {
-                let mut i = 0;
-                move || {
-                    i += 1;
-                    Vec3::new(0.0, (i % 128) as f32, (i / 128) as f32)
-                }
-            },
-            &mut {
-                let mut i = 0.0;
-                move || {
-                    i += 1.0;
-                    Vec3::new(0.5, 0.25, -i)
-                }
-            },
-        ];
-        for (i, point) in points.into_iter().enumerate() {
-            let tried = (0..POINTS).filter(|_| is_tried(point())).count() as f64;
-            let (mean, p) = (f64::from(POINTS) / f64::from(TRIED), 1.0 / f64::from(TRIED));
-            let sigma = (f64::from(POINTS) * p * (1.0 - p)).sqrt();
-            assert!((tried - mean).abs() < 4.0 * sigma, "{i}: {tried}");
-        }
+        assert!(mean([half].iter()).is_none() && mean([half, half].iter()).is_some());
+        assert!(mean([].iter()).is_none());
     }
 
     #[test]

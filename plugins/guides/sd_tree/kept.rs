@@ -2,17 +2,17 @@
 //!
 //! | bytes | what |
 //! |---|---|
-//! | `u64`, `u32`, `u16`, `u16` | records taken in, iterations, whether the limit of memory was reached, sets of directions (0: one) |
+//! | `u64`, `u32`, 3 `u16` | records taken in, iterations, whether the limit of memory was reached, whether paths are left to the BSDF, sets of directions (0: one) |
 //! | | the tree over space: number of nodes, two children each |
 //! | `u32` | trees over directions, then each: number of quads, four `u16` each |
-//! | | cells of space, one more than nodes: which tree over directions (0: none), probability of the guide, fluence, records, the descent that learns the probability, shape of the sums, and the sums unless all are 0, what scattering brings, what the guide gains, `u16`: whether all vertices are guided |
+//! | | cells of space, one more than nodes: which tree over directions (0: none), probability of the guide, fluence, records, the descent that learns the probability, shape of the sums, and the sums unless all are 0, what scattering brings, what the guide gains |
 //! | | if there are two sets, what each cell keeps apart: which tree over directions, probability, fluence, records, descent, sums |
 //!
 //! Cells that share a tree over directions still do afterwards.
 
 use super::Settings;
 use super::field::{Field, Leaf};
-use super::gain::Gain;
+use super::gain::{self, Gain};
 use super::learner::{Cell, Learner};
 use super::mixing::Mixing;
 use super::outlook;
@@ -60,6 +60,7 @@ impl Learner {
         to.u64(self.taken);
         to.u32(self.iterations);
         to.u16(self.full.into());
+        to.u16(self.left.into());
         to.u16(sets::number(self.settings.sets) as u16);
         self.tree.pack(&mut to);
         let (mut trees, mut numbers) = (Vec::new(), HashMap::new());
@@ -78,7 +79,6 @@ impl Learner {
             pack_set(numbers, &cell.mixing, &cell.sums, &mut to);
             outlook::pack(&cell.outlooks, &leaf.outlooks, &mut to);
             cell.gain.pack(&mut to);
-            to.u16(leaf.open.into());
         }
         for (apart, leaf) in self.apart.iter().zip(&self.field.apart) {
             let numbers = (number(&apart.directions), leaf.p, apart.fluence, apart.count);
@@ -95,6 +95,7 @@ impl Learner {
         let mut from = Cursor::new(bytes);
         let (taken, iterations) = (from.u64("the records taken in")?, from.u32("the iterations")?);
         let full = from.u16("the limit of memory")? != 0;
+        let left = from.u16("whether paths are guided")? != 0 && settings.may_leave();
         let sets = sets::of_number(from.u16("the sets of directions")?.into());
         let sets = sets.ok_or_else(|| IoError::new("has sets of directions that are not known"))?;
         if settings.sets_asked && settings.sets != sets {
@@ -119,8 +120,7 @@ impl Learner {
             let (directions, p_guide) = (numbered(tree)?, settings.p_guide.unwrap_or(p_guide));
             let (outlooks, known) = outlook::unpack(&mut from)?;
             let gain = Gain::unpack(&mut from)?;
-            let open = from.u16("a cell")? != 0 || settings.p_guide.is_some();
-            leaves.push(Leaf { directions: directions.clone(), p_guide, open, fluence, outlooks: known });
+            leaves.push(Leaf { directions: directions.clone(), p_guide, fluence, outlooks: known });
             cells.push(Cell { sums, count, mixing, gain, halved: 0, directions, fluence, outlooks });
         }
         let (mut apart, mut known) = (Vec::new(), Vec::new());
@@ -132,9 +132,11 @@ impl Learner {
             apart.push(Apart { sums, count, mixing, directions, fluence });
         }
         from.end()?;
-        let field = Arc::new(Field::new(tree.clone(), leaves, settings.cosine, sets, known));
+        let mut field = Field::new(tree.clone(), leaves, settings.cosine, sets, known);
+        field.guides = !left;
         field.validate().map_err(IoError::new)?;
-        Ok(Learner { settings, tree, cells, apart, field, taken, iterations, full })
+        let field = Arc::new(field);
+        Ok(Learner { settings, tree, cells, apart, field, taken, iterations, full, left })
     }
 
     /// What it holds, in numbers.
@@ -155,6 +157,7 @@ impl Learner {
         };
         let p_mean = leaves.iter().map(|leaf| f64::from(leaf.p_guide)).sum::<f64>() / leaves.len() as f64;
         let known = || leaves.iter().filter(|leaf| leaf.directions.is_some());
+        let gain = gain::mean(self.cells.iter().map(|cell| &cell.gain)).unwrap_or(0.0);
         let mut facts = vec![
             ("iterations", FactValue::Count(self.iterations.into())),
             ("records", FactValue::Count(self.taken)),
@@ -165,6 +168,7 @@ impl Learner {
             ("nodes per lit cell", FactValue::Number(nodes as f64 / (lit as f64).max(1.0))),
             ("depth of directions", FactValue::Count(deepest as u64)),
             ("mean probability of the guide", FactValue::Number(p_mean)),
+            ("mean gain in nats", FactValue::Number(gain)),
             ("probability of the guide", range(&mut known().map(|leaf| leaf.p_guide))),
             ("fluence", range(&mut known().map(|leaf| leaf.fluence))),
             ("memory in MiB", FactValue::Number(self.bytes() as f64 / f64::from(1 << 20))),

@@ -10,14 +10,14 @@
 //! | upper levels of quadtrees | as the flux asks | always three, as a table that the cosine can weight |
 //! | filter of directions | cut off at the edges | goes round in the azimuth, is moved inside at the poles |
 //! | probability of the guide | any | from 0.05 to 0.7 if learnt, at most 0.95 if given |
-//! | where the guide gains little | guided all the same | [most vertices](super::gain) are left to the BSDF |
+//! | where the guide gains little | guided all the same | [the whole picture](super::gain) is left to the BSDF |
 //! | gradient of that probability | as large as the radiance | over its mean, or the regularisation would depend on it |
 //! | descent: rate, decays, regularisation | 0.01, 0.9 and 0.999, 0.01 | the same |
 //! | light that emitter sampling finds | not learnt, or by its weight | by its weight |
 //! | weights of iterations | inverse mean variance of themselves | of the other half of the pixels |
 //! | roulette | none, or by the light ahead | by the light ahead, learnt for each side of surfaces in a cell |
 //! | iterations at the start, then | 8 of 1 sample, then 1, 2, 4, … | 8 of 1 sample, then as many as all before: 8, 16, 32, … |
-//! | the last iteration | as long as two would be | from half to twice as long as all before: guided by a third of all samples or more, instead of by an eighth |
+//! | the last iteration | as long as two would be, guided by an eighth of all samples | begins once a tenth of the budget is spent: learning costs more than it brings then |
 
 use super::cylinder;
 use super::field::{Field, Leaf};
@@ -56,6 +56,8 @@ pub struct Learner {
     pub(super) iterations: u32,
     /// The limit of memory was reached.
     pub(super) full: bool,
+    /// Paths are left to the BSDF, since [too little is gained](gain).
+    pub(super) left: bool,
 }
 
 /// A cell of space that is filled.
@@ -96,7 +98,7 @@ impl Learner {
             sets,
             apart.iter().map(|apart| apart.leaf(&cells[0], &settings)).collect(),
         ));
-        Learner { settings, tree, cells, apart, field, taken: 0, iterations: 0, full: false }
+        Learner { settings, tree, cells, apart, field, taken: 0, iterations: 0, full: false, left: false }
     }
 
     /// Where the record goes, with the part of it in each cell.
@@ -104,22 +106,21 @@ impl Learner {
         const EDGE: u32 = 1 << 20;
         let cell = self.tree.cell(record.p);
         let (leaf, depth) = self.tree.leaf(cell);
-        let whole = if self.field.leaves[leaf as usize].open { 1.0 } else { gain::TRIED as f32 };
         if self.settings.spatial_filter == SpatialFilter::Nearest || depth == 0 {
-            return put(leaf, whole);
+            return put(leaf, 1.0);
         }
         // A box as large as the leaf with the point in its middle, moved into the cube.
         let size = SpatialTree::extent(depth);
         let low = [0, 1, 2].map(|axis: usize| cell[axis].saturating_sub(size[axis] / 2).min(EDGE - size[axis]));
         if self.settings.spatial_filter == SpatialFilter::Box {
-            return self.tree.overlaps(low, size, &mut |cell, share| put(cell, share * whole));
+            return self.tree.overlaps(low, size, put);
         }
         let random = mix(number);
         let jittered = [0, 1, 2].map(|axis: usize| {
             let u = random >> (21 * axis) & 0xf_ffff;
             low[axis] + ((u * u64::from(size[axis])) >> 20) as u32
         });
-        put(self.tree.leaf(jittered).0, whole);
+        put(self.tree.leaf(jittered).0, 1.0);
     }
 
     /// All parts of all records, ordered by cell, then by tile and record.
@@ -257,12 +258,15 @@ impl GuideLearner for Learner {
         }
         let filled = filled(&mut self.cells, &parts);
         let (filter, learns_mixing) = (self.settings.directional_filter, self.settings.p_guide.is_none());
+        let learns_gain = self.settings.may_leave();
         filled.into_par_iter().for_each(|(cell, parts)| {
             for part in parts {
                 let record = &tiles[part.tile as usize][part.record as usize];
                 cell.take(record, f64::from(part.share), filter);
                 if learns_mixing {
                     cell.mixing.step(record);
+                }
+                if learns_gain {
                     cell.gain.add(record);
                 }
             }
@@ -271,7 +275,7 @@ impl GuideLearner for Learner {
 
     fn learn_outlook(&mut self, tiles: &[Vec<VertexRecord>]) {
         let parts = self.parts(tiles, |record, _, put| put(self.tree.leaf(self.tree.cell(record.p)).0, 1.0));
-        let alone = !self.settings.directions;
+        let alone = !self.settings.directions || self.left;
         filled(&mut self.cells, &parts).into_par_iter().for_each(|(cell, parts)| {
             for part in parts {
                 let record = &tiles[part.tile as usize][part.record as usize];
@@ -282,6 +286,10 @@ impl GuideLearner for Learner {
     }
 
     fn refine(&mut self, spp: u32) {
+        if self.settings.may_leave() && !self.left && self.iterations + 1 >= self.settings.trial {
+            let gain = gain::mean(self.cells.iter().map(|cell| &cell.gain));
+            self.left = gain.is_some_and(|gain| gain < self.settings.least_gain);
+        }
         let p_guide = self.settings.p_guide;
         let total: f64 = self.cells.iter().map(|cell| cell.sums.total()).sum();
         if total > 0.0 && total.is_finite() {
@@ -300,23 +308,17 @@ impl GuideLearner for Learner {
             cell.gain.fade(self.settings.memory);
         });
         self.apart.iter_mut().for_each(|apart| apart.count *= self.settings.memory);
-        let least_gain = self.settings.least_gain;
-        let gated = least_gain > 0.0 && p_guide.is_none() && self.apart.is_empty();
         let leaf = |cell: &Cell| Leaf {
             directions: cell.directions.clone(),
             p_guide: p_guide.unwrap_or_else(|| cell.mixing.p_guide()),
-            open: !(gated && cell.gain.is_below(least_gain)),
             fluence: cell.fluence,
             outlooks: std::array::from_fn(|side| cell.outlooks[side].outlook()),
         };
         let leaves = self.cells.iter().map(leaf).collect();
-        self.field = Arc::new(Field::new(
-            self.tree.clone(),
-            leaves,
-            self.settings.cosine,
-            self.settings.sets,
-            self.apart_leaves(),
-        ));
+        let Settings { cosine, sets, .. } = self.settings;
+        let mut field = Field::new(self.tree.clone(), leaves, cosine, sets, self.apart_leaves());
+        field.guides = !self.left;
+        self.field = Arc::new(field);
         self.iterations += 1;
     }
 
@@ -338,6 +340,9 @@ impl GuideLearner for Learner {
             nodes as f64 / count,
         )];
         lines.extend(self.apart_summary());
+        if self.left {
+            lines.push("sd_tree: it gains too little here, and leaves the picture to the BSDF (least_gain)".to_owned());
+        }
         if self.full {
             lines.push("sd_tree: the limit of memory was reached, the tree is coarser than it should be".to_owned());
         }

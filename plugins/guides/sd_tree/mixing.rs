@@ -19,8 +19,8 @@ const MOST: f32 = 8.0;
 /// A learnt probability stays within these, so that neither way of sampling is given up.
 pub const LIMITS: (f32, f32) = (0.05, 0.95);
 
-/// The probability of the guide stays below this. More would gain a fifth at best; what the guide has not seen, the BSDF
-/// must find.
+/// The probability of the guide stays below this, so that light the guide has not seen counts at most 3.3 times what it
+/// would by the BSDF alone, and not 20 times. Light it has seen counts at most 1.36 times what it would at 0.95.
 const MOST_LEARNT: f32 = 0.7;
 
 /// The state of the descent in one leaf.
@@ -150,37 +150,40 @@ impl Mixing {
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::*;
     use lucerna_core::math::Vec3;
     use lucerna_core::sampling::Pcg32;
 
-    /// Light from one half of the directions, `inside` of it in a part where the guide has all its density; the ideal
-    /// probability is known in closed form. Directions are in [0, 1): the BSDF is uniform, the guide is uniform on the
-    /// first tenth.
+    /// What a path finds where directions are numbers in [0, 1): the BSDF is uniform, the guide has probability `p_guide`
+    /// and is uniform on the first `part`, and `inside` of the light comes from there, the rest from elsewhere.
+    pub fn found_in_a_part(p_guide: f32, part: f32, inside: f32, pcg: &mut Pcg32) -> GuideRecord {
+        let (choice, u) = (pcg.next_f32(), pcg.next_f32());
+        let x = if choice < p_guide { part * u } else { u };
+        let pdf_guide = if x < part { 1.0 / part } else { 0.0 };
+        let pdf = p_guide * pdf_guide + (1.0 - p_guide);
+        let radiance = if x < part { inside / part } else { (1.0 - inside) / (1.0 - part) };
+        GuideRecord {
+            p: Vec3::ZERO,
+            d: Vec3::Z,
+            radiance,
+            direct: 0.0,
+            scattered: radiance / pdf,
+            pdf,
+            pdf_bsdf: 1.0,
+            pdf_guide,
+            pdf_sets: [0.0; 2],
+            kind: RecordKind::Mixed,
+            primary: false,
+        }
+    }
+
+    /// Learns the probability of a guide that knows a tenth of the directions; what is ideal is known in closed form.
     fn learn(inside: f32, scale: f32, steps: u32) -> f32 {
         let (mut mixing, mut pcg) = (Mixing::default(), Pcg32::new(7, 7));
         for _ in 0..steps {
-            let p = mixing.p_guide();
-            let (choice, u) = (pcg.next_f32(), pcg.next_f32());
-            let x = if choice < p { 0.1 * u } else { u };
-            let pdf_guide = if x < 0.1 { 10.0 } else { 0.0 };
-            let pdf = p * pdf_guide + (1.0 - p);
-            let value = scale * if x < 0.1 { 10.0 * inside } else { (1.0 - inside) / 0.9 };
-            let (radiance, scattered, kind) = (value, value / pdf, RecordKind::Mixed);
-            mixing.step(&GuideRecord {
-                p: Vec3::ZERO,
-                d: Vec3::Z,
-                radiance,
-                direct: 0.0,
-                scattered,
-                pdf,
-                pdf_bsdf: 1.0,
-                pdf_guide,
-                pdf_sets: [0.0; 2],
-                kind,
-                primary: false,
-            });
+            let record = found_in_a_part(mixing.p_guide(), 0.1, inside, &mut pcg);
+            mixing.step(&GuideRecord { scattered: scale * record.scattered, ..record });
         }
         assert_eq!(mixing.p_guide(), (1.0 - mixing.p()).clamp(0.05, MOST_LEARNT));
         1.0 - mixing.p()

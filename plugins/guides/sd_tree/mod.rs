@@ -17,7 +17,7 @@
 //! | `spatial_filter` | string | stochastic | records go to the cell they lie in (`nearest`), to one in a box about it (`stochastic`), or to all of the `box` by volume |
 //! | `directional_filter` | string | box | records go to the directions they lie in (`nearest`), or to all in a `box` about them by area |
 //! | `p_guide` | float | unset | probability of the guide, limited to 0.95; learnt if unset, up to 0.7 |
-//! | `least_gain` | float | 0.05 | where the mixture is closer than the BSDF alone to the light that is scattered by less than so many nats (divergence of Kullback and Leibler), three vertices in four are left to the BSDF; 0: all are guided. Only where `p_guide` is learnt and `sets` is `one` |
+//! | `least_gain` | float | 0.12 | if the mixture is closer than the BSDF alone to the light that is scattered by less than so many nats (divergence of Kullback and Leibler, mean over all vertices), the rest of the picture is left to the BSDF, and to roulette; 0: never. Only where `p_guide` is learnt and `sets` is `one` |
 //! | `product` | string | cosine | what the guide follows: `none`, the light alone; `cosine`, its product with the cosine, for BSDFs that reflect only; `resampling`, its product with any BSDF, by a choice among candidates |
 //! | `candidates` | integer | 2 | for `resampling`: directions drawn at a vertex, of which one is followed |
 //! | `sets` | string | one | sets of directions in each cell of space: `one`; `direct_indirect`, one for light of emitters that a scattered ray runs into and one for all other light, whose mixture is learnt; `primary_product`, one for what first hits scatter towards the camera (light times BSDF times cosine) and one for light that arrives at later vertices |
@@ -25,18 +25,24 @@
 //! | `nee` | string | always | when lights are sampled: `never`, `kickstart` (the first 128 samples per pixel), `always` |
 //! | `direct` | boolean | true | light that emitter sampling also finds is learnt, times the weight of finding it by scattering |
 //! | `startup` | integer | 8 | iterations of one sample per pixel before those that have as many samples as all before them |
-//! | `ending` | string | doubling | when the last iteration begins: once the one after it could not be completed (`doubling`), or, from 256 samples per pixel on, as soon as the `variance` that the rest of the budget would leave rises from one iteration to the next |
+//! | `learning` | float | 0.1 | the last iteration, from which nothing is learnt, begins once so much of the budget is spent; 1/3 is nearly as published |
+//! | `ending` | string | doubling | when else it begins: never (`doubling`), or, from 256 samples per pixel on, as soon as the `variance` that the rest of the budget would leave rises from one iteration to the next |
 //! | `combination` | string | inverse_variance | which iterations make the picture: the last four by `inverse_variance`, or the `last` |
 //! | `max_memory` | float | 64 | MiB that the trees may take; then they stay coarser |
 //! | `file` | string | unset | a file to begin with, if it is there, and to leave what was learnt in; a relative name is looked for beside the scene. Only `render` writes it, and its `--guide-file` takes the place of both this and `frozen` |
 //! | `frozen` | boolean | false | nothing is learnt, and the file, which must be there, stays as it is |
 //!
 //! Where light is found rarely but from few directions, as that of a small lamp through glass, `prior` hides what was
-//! found: 0 may be better there. `lucerna compare scene.xml -m path path+guide=sd_tree path+guide=sd_tree:prior=0` tells
-//! that, and what each sample costs.
+//! found, and a tenth of the budget is too little to learn from.
+//! `lucerna compare scene.xml -m path path+guide=sd_tree path+guide=sd_tree:prior=0,learning=0.333` tells that, and what
+//! each sample costs.
 //!
 //! Two `sets` have to share what is found and cost time; whether they pay in a scene tells
 //! `lucerna compare scene.xml -m path+guide=sd_tree path+guide=sd_tree:sets=direct_indirect`.
+//!
+//! Whether to guide at all is decided by `least_gain` when the start is over, and after each iteration that learns: for the
+//! rest of the run, since what does not pay by then has too little left to pay for itself. Dear rays pay earlier than cheap
+//! ones, which the threshold does not know: `sd_tree:least_gain=0` in `compare` tells.
 //!
 //! Limits. A cell of space has one distribution for all its points: a bright spot near by is blurred by parallax until
 //! the cells are small, which takes millions of samples. Small or short renders, and those whose noise comes from
@@ -86,6 +92,13 @@ use lucerna_core::render::Learnt;
 use lucerna_core::scene::{Built, Constructor, Failed, Param, Plugin, Properties};
 use std::sync::Arc;
 
+/// The part of the budget in which something is learnt: notes cost about as much time as they save in what is left, if
+/// that is less than ten times as long.
+const LEARNING: f64 = 0.1;
+
+/// Iterations after which the guide is judged, where the start has fewer.
+const LEAST_TRIAL: u32 = 4;
+
 /// Table entry.
 pub const PLUGIN: Plugin = Plugin {
     name: "sd_tree",
@@ -101,7 +114,7 @@ pub const PLUGIN: Plugin = Plugin {
         Param::choice("spatial_filter", &["nearest", "stochastic", "box"], "stochastic", "cells a record goes to"),
         Param::choice("directional_filter", &["nearest", "box"], "box", "directions a record goes to"),
         Param::float_opt("p_guide", "probability of the guide; learnt if unset").range(0.0, 1.0),
-        Param::float("least_gain", 0.05, "nats that the guide must gain, or most vertices are left to the BSDF")
+        Param::float("least_gain", 0.12, "nats that the guide must gain, or the picture is left to the BSDF")
             .range(0.0, 1e3),
         Param::choice(
             "product",
@@ -116,6 +129,7 @@ pub const PLUGIN: Plugin = Plugin {
         Param::choice("nee", &["never", "kickstart", "always"], "always", "when lights are sampled"),
         Param::bool("direct", true, "learns light that emitter sampling also finds, by its weight"),
         Param::int("startup", 8, "iterations of one sample per pixel at the start").range(0.0, 64.0),
+        Param::float("learning", LEARNING, "part of the budget after which nothing more is learnt").range(0.0, 0.5),
         Param::choice("ending", &["doubling", "variance"], "doubling", "when the last iteration begins"),
         Param::choice(
             "combination",
@@ -158,8 +172,10 @@ struct Settings {
     spatial_filter: SpatialFilter,
     directional_filter: DirectionalFilter,
     p_guide: Option<f32>,
-    /// What the guide must gain over the BSDF where all vertices are guided, in nats; 0 if they are everywhere.
+    /// What the guide must gain over the BSDF, in nats, or paths are left to that; 0 if they never are.
     least_gain: f64,
+    /// Iterations after which it must.
+    trial: u32,
     cosine: bool,
     max_bytes: usize,
     /// What each cell keeps apart.
@@ -168,6 +184,13 @@ struct Settings {
     sets_asked: bool,
     /// Whether directions are learnt; else only what scattering brings.
     directions: bool,
+}
+
+impl Settings {
+    /// Whether paths are left to the BSDF where [little is gained](gain).
+    fn may_leave(&self) -> bool {
+        self.least_gain > 0.0 && self.p_guide.is_none() && self.sets == GuideSets::One
+    }
 }
 
 fn build(p: &Properties<'_>) -> Built<dyn Guide> {
@@ -189,6 +212,7 @@ fn build(p: &Properties<'_>) -> Built<dyn Guide> {
         },
         p_guide: p.float_opt("p_guide").map(|p| p.min(MOST_GUIDED)),
         least_gain: p.double("least_gain"),
+        trial: number("startup").max(LEAST_TRIAL),
         cosine: p.choice("product") != "none",
         max_bytes: (p.double("max_memory") * f64::from(1 << 20)) as usize,
         sets: sets::of_name(p.choice("sets")),
@@ -201,6 +225,7 @@ fn build(p: &Properties<'_>) -> Built<dyn Guide> {
             "variance" => Ending::Variance,
             _ => Ending::Doubling,
         },
+        learning: p.double("learning"),
         combination: match p.choice("combination") {
             "last" => Combination::Last,
             _ => Combination::InverseVariance,
@@ -250,6 +275,7 @@ pub(crate) fn outlook_alone() -> Arc<dyn Guide> {
         directional_filter: DirectionalFilter::Nearest,
         p_guide: Some(0.0),
         least_gain: 0.0,
+        trial: 0,
         prior: 0.0,
         memory: 0.0,
         cosine: false,
@@ -261,6 +287,7 @@ pub(crate) fn outlook_alone() -> Arc<dyn Guide> {
     let training = Training {
         startup: 4,
         ending: Ending::Doubling,
+        learning: LEARNING,
         combination: Combination::All,
         emitter_sampling: EmitterSampling::Always,
         learn_direct: true,

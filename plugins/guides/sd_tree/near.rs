@@ -20,8 +20,6 @@ struct Entry {
     /// Where the tree begins; [`NONE`] if nothing is known.
     tree: u32,
     p_guide: f32,
-    /// Whether all vertices are guided.
-    open: bool,
 }
 
 const NONE: u32 = u32::MAX;
@@ -38,25 +36,16 @@ impl Near {
                 place
             })
         };
-        let entry = |leaf: &Leaf| Entry {
-            tree: leaf.directions.as_ref().map_or(NONE, &mut place),
-            p_guide: leaf.p_guide,
-            open: leaf.open,
-        };
+        let entry =
+            |leaf: &Leaf| Entry { tree: leaf.directions.as_ref().map_or(NONE, &mut place), p_guide: leaf.p_guide };
         let cells = leaves.iter().map(entry).collect();
         Near { cells, quads }
-    }
-
-    /// Whether all vertices in a cell are guided.
-    #[inline]
-    pub fn is_open(&self, cell: usize) -> bool {
-        self.cells[cell].open
     }
 
     /// The tree of a cell, and the probability of the guide.
     #[inline]
     pub fn get(&self, cell: usize) -> Option<(Quads<'_>, f32)> {
-        let Entry { tree, p_guide, .. } = self.cells[cell];
+        let Entry { tree, p_guide } = self.cells[cell];
         // Nothing begins at `NONE`.
         Some((Quads::new(self.quads.get(tree as usize..)?)?, p_guide))
     }

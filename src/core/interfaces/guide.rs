@@ -61,6 +61,9 @@ pub struct Training {
     pub startup: u32,
     /// When the last iteration begins.
     pub ending: Ending,
+    /// The part of the budget that may be spent when an iteration begins from which something is to be learnt. (Each is as
+    /// long as all before it; where a run begins with a file, it counts as spent what that would take.)
+    pub learning: f64,
     /// What becomes of the pictures of the iterations.
     pub combination: Combination,
     /// When lights are sampled.
@@ -77,7 +80,7 @@ pub struct Training {
 /// When the last iteration begins, which has all that is left of the budget.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
-    /// Once the iteration after it could not be completed.
+    /// Once [`Training::learning`] of the budget is spent.
     Doubling,
     /// Then, or when the variance that the rest of the budget would leave no longer falls from iteration to iteration
     /// (Müller, Gross, Novák 2017, section 5).
@@ -167,8 +170,13 @@ pub enum FactValue {
 
 /// What has been learnt.
 pub trait GuideField: Send + Sync {
-    /// The directions learnt where a path is scattered.
-    fn at<'g>(&'g self, hit: &SurfaceHit, vertex: GuidedVertex, arena: &'g Arena) -> GuideHere<'g>;
+    /// The directions learnt where a path is scattered; `None` where nothing is known.
+    fn at<'g>(&'g self, hit: &SurfaceHit, vertex: GuidedVertex, arena: &'g Arena) -> Option<&'g dyn GuidedDirections>;
+
+    /// Whether paths are to be guided. If not, nobody asks [`at`](Self::at) or tells of directions.
+    fn guides(&self) -> bool {
+        true
+    }
 
     /// Which sets of directions it has: what records must tell it.
     fn sets(&self) -> GuideSets {
@@ -189,28 +197,6 @@ pub trait GuideField: Send + Sync {
     /// # Errors
     /// What does not hold.
     fn validate(&self) -> std::result::Result<(), String>;
-}
-
-/// What a field tells about a vertex.
-#[derive(Clone, Copy)]
-pub enum GuideHere<'g> {
-    /// Nothing is known yet.
-    Unknown,
-    /// The BSDF does as well alone, and nothing needs to be recorded.
-    Left,
-    /// The directions learnt.
-    Known(&'g dyn GuidedDirections),
-}
-
-impl<'g> GuideHere<'g> {
-    /// The directions, if there are any.
-    #[inline]
-    pub fn known(self) -> Option<&'g dyn GuidedDirections> {
-        match self {
-            GuideHere::Known(directions) => Some(directions),
-            GuideHere::Unknown | GuideHere::Left => None,
-        }
-    }
 }
 
 /// The sets of directions that a field has at each place.

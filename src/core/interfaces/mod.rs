@@ -32,7 +32,7 @@ pub use bsdf::{Arena, Bsdf, Bxdf, BxdfSample, Lobes, Transport};
 pub use emitter::{Emitter, EmitterFlags, LightBounds, LightPoint, LightSample};
 pub use film::{ComponentFormat, FileFormat, Film, FilmSettings, PixelFormat};
 pub use guide::{
-    Combination, EmitterSampling, Ending, FactValue, Guide, GuideFact, GuideField, GuideFile, GuideHere, GuideLearner,
+    Combination, EmitterSampling, Ending, FactValue, Guide, GuideFact, GuideField, GuideFile, GuideLearner,
     GuideRecord, GuideSets, GuidedDirections, GuidedVertex, MOST_GUIDED, RecordKind, Subjects, Training, VertexRecord,
     is_guided,
 };

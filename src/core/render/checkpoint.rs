@@ -14,7 +14,7 @@ use std::cell::Cell;
 use std::path::PathBuf;
 
 /// Files of where a render stands.
-const KIND: Kind = Kind { magic: *b"LUCSTATE", version: 2, what: "a checkpoint" };
+const KIND: Kind = Kind { magic: *b"LUCSTATE", version: 3, what: "a checkpoint" };
 
 /// Where the state of a run is kept. The run goes on from the file if it is there.
 #[derive(Clone, Debug, PartialEq)]

@@ -9,7 +9,7 @@ use crate::math::{Aabb, Vec3};
 use std::path::Path;
 
 /// Files of what was learnt.
-const KIND: Kind = Kind { magic: *b"LUCGUIDE", version: 2, what: "a file of what a guide has learnt" };
+const KIND: Kind = Kind { magic: *b"LUCGUIDE", version: 3, what: "a file of what a guide has learnt" };
 
 /// What such a file holds.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,11 +3,11 @@
 //! Rendering is cut into iterations. In each, paths are guided by what the iterations before have taught, and note what
 //! they find; what a field gives does not change meanwhile. So every picture is unbiased, and has the same bits for any
 //! number of threads. First come some iterations of one sample per pixel, by which the field learns where paths go at
-//! all; then each has as many as all before it together. The last one takes all that is left of the budget, if that is
-//! less than twice as much (or learning more no longer pays: [`Ending`]), and notes nothing, unless what is learnt is
-//! kept (after Müller, Gross, Novák 2017, section 5, and Müller 2019, sections 10.2 and 10.7, where iterations begin to
-//! double at one sample again, and the last one is as long as two: half of the picture then is guided by an eighth of
-//! the samples). How the pictures become one: [`super::combine`].
+//! all; then each has as many as all before it together. Once a part of the budget is spent ([`Training::learning`]; or
+//! learning more no longer pays: [`Ending`]), the last one takes all that is left, and notes nothing, unless what is learnt
+//! is kept (after Müller, Gross, Novák 2017, section 5, and Müller 2019, sections 10.2 and 10.7, where iterations begin to
+//! double at one sample again, and the last one is as long as two). A field may also find that guiding does not pay
+//! ([`GuideField::guides`]). How the pictures become one: [`super::combine`].
 
 use super::checkpoint::Keeper;
 use super::combine::Moments;
@@ -208,8 +208,9 @@ impl Lesson<'_, '_> {
         let enough = self.frozen || self.at.course.enough;
         let (begin, left) = (self.at.report.spp, self.asked - self.at.report.spp);
         let likely = self.samples_left(pace);
-        // What would be left for another one is less than it should have: this one is the last, and takes it.
-        let last = enough || (!is_startup && likely < wanted.saturating_mul(2));
+        // More would be spent on learning than is to be: this one is the last, and takes all that is left.
+        let part = f64::from(wanted) / (f64::from(wanted) + f64::from(likely));
+        let last = enough || (!is_startup && part > self.training.learning);
         let size = if last { left } else { wanted.min(left) };
         // Nobody learns from the last one, unless what was learnt is kept.
         let learning = if last || size == left { self.keeps && wanted <= likely } else { true };
@@ -289,11 +290,14 @@ impl Lesson<'_, '_> {
             EmitterSampling::Always => true,
         };
         let Training { learn_direct, least_roughness, candidates, .. } = self.training;
-        let subjects = self.subjects;
+        let field = self.at.learner.field();
+        let directions = self.subjects.directions && field.guides();
+        let subjects = Subjects { directions, ..self.subjects };
+        let learning = learning && (subjects.directions || subjects.outlook);
         if subjects.outlook && start > 0 {
             self.at.estimates.update(self.at.report.rays as f64 / self.at.report.samples as f64);
         }
-        let (field, learner) = (self.at.learner.field(), &mut self.at.learner);
+        let learner = &mut self.at.learner;
         let (sets, goal) = (field.sets(), Goal::default());
         let guidance =
             Guidance { field: &*field, sample_emitters, learning, subjects, sets, goal, least_roughness, candidates };

@@ -109,6 +109,7 @@ pub(super) fn guided_path(editor: &mut Editor, node: NodeId) -> Option<String> {
     } else {
         editor.set(guide, "least_gain", Value::Float(0.0));
     }
+    editor.set(guide, "learning", Value::Float(0.333));
     // It compares with the number times the square root of a quarter of the samples per pixel.
     editor.set(guide, "spatial_threshold", Value::Float(0.5 * spatial_threshold));
     editor.set(guide, "directional_threshold", Value::Float(directional_threshold));

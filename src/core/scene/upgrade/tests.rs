@@ -70,7 +70,7 @@ fn guided_path_with_all_its_parameters() {
              <guide name='_guide' type='sd_tree'><string name='nee' value='kickstart'/>\
              <string name='spatial_filter' value='stochastic'/><string name='directional_filter' value='box'/>\
              <string name='combination' value='inverse_variance'/><float name='least_gain' value='0'/>\
-             <float name='spatial_threshold' value='2000'/>\
+             <float name='learning' value='0.333'/><float name='spatial_threshold' value='2000'/>\
              <float name='directional_threshold' value='0.02'/><float name='max_memory' value='32'/>\
              <boolean name='direct' value='false'/><integer name='startup' value='0'/><string name='product' value='none'/>\
              <float name='roughness_threshold' value='0'/></guide></integrator>",
@@ -81,7 +81,7 @@ fn guided_path_with_all_its_parameters() {
             "<integrator type='path'><guide name='_guide' type='sd_tree'><string name='nee' value='never'/>\
              <string name='spatial_filter' value='nearest'/><string name='directional_filter' value='nearest'/>\
              <string name='combination' value='last'/><float name='p_guide' value='0.5'/>\
-             <float name='spatial_threshold' value='6000'/><float name='directional_threshold' value='0.01'/>\
+             <float name='learning' value='0.333'/><float name='spatial_threshold' value='6000'/><float name='directional_threshold' value='0.01'/>\
              <boolean name='direct' value='false'/><integer name='startup' value='0'/><string name='product' value='none'/>\
              <float name='roughness_threshold' value='0'/></guide></integrator>\
              <sensor type='perspective'><sampler type='independent'><integer name='sample_count' value='9'/></sampler></sensor>",
