@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Makes the table and the plot of `benches/ablations.md` from the results of a comparison.
 
-    lucerna compare SCENE -m benches/ablations.toml --size 96x54 --spp 256 --no-curves -o target/ablations
+    lucerna compare SCENE -m benches/ablations.toml --size 96x54 --spp 128 --no-curves -o target/ablations
     benches/ablations.py target/ablations --plot benches/ablations.svg
 
 Prints error and time as multiples of those of the baseline, and efficiency, 1/(relMSE · seconds), over that of the baseline
@@ -30,11 +30,10 @@ def main():
             "error": point["rel_mse"]["value"],
             "time": point["seconds"]["value"],
             "efficiency": efficiency["value"],
-            "low": efficiency.get("low"),
-            "high": efficiency.get("high"),
+            "low": efficiency["low"],
+            "high": efficiency["high"],
         })
-    # The one that all others are compared with.
-    base = next(row for row in rows if row["efficiency"] == 1.0)
+    base = next(row for row in rows if row["method"] == scene["baseline"])
     text = "| | error | time | efficiency |\n|---|---|---|---|\n"
     for row in rows:
         interval = "" if row is base else f" [{row['low']:.3g}, {row['high']:.3g}]"

@@ -61,7 +61,9 @@ def plot_ratios(path, title, groups, axis):
         axes.errorbar(middle, place, xerr=ends, fmt="o", capsize=3, markersize=5, label=name)
     axes.axvline(1.0, color="black", linewidth=0.8)
     axes.set_xscale("log")
-    ticks = [t for t in (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 0.7, 1, 1.5, 2, 3, 5, 10, 20, 50) if axes.get_xlim()[0] <= t <= axes.get_xlim()[1]]
+    least, largest = axes.get_xlim()
+    round_ones = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 0.7, 1, 1.5, 2, 3, 5, 10, 20, 50)
+    ticks = [t for t in round_ones if least <= t <= largest]
     axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
     axes.minorticks_off()
     axes.set_yticks(range(len(labels)), labels)

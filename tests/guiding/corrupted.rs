@@ -48,8 +48,9 @@ fn build(p: &Properties<'_>) -> Built<dyn Guide> {
             value("candidates", lucerna::core::scene::Value::Integer(p.int("candidates"))),
             value("sets", lucerna::core::scene::Value::String(p.string("sets").to_owned())),
             value("nee", lucerna::core::scene::Value::String(p.choice("nee").to_owned())),
-            // All vertices are spoilt.
+            // All vertices are spoilt, and iterations are several.
             value("least_gain", lucerna::core::scene::Value::Float(0.0)),
+            value("learning", lucerna::core::scene::Value::Float(0.4)),
             // Small, so that a few samples make many cells.
             value("spatial_threshold", lucerna::core::scene::Value::Float(200.0)),
         ],

@@ -2,7 +2,7 @@
 //! damaged files could do.
 
 use super::field::{self, REFLECTS, hit, train};
-use super::{SCENES, scene};
+use super::{SCENES, guided, left_to_the_bsdf, scene};
 use crate::support::damage::{Random, damage_bytes};
 use lucerna::core::interfaces::{Arena, GuideLearner, GuidedVertex};
 use lucerna::core::math::{Aabb, Vec2, Vec3};
@@ -14,9 +14,6 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-/// A guide with small cells, so that there are many, and several iterations.
-const GUIDED: &str =
-    "<guide type='sd_tree'><float name='spatial_threshold' value='100'/><float name='learning' value='0.4'/></guide>";
 /// Goes by estimates of pixels and by what scattering brings, and splits often.
 const ADJOINT: &str = "<roulette type='adjoint'><float name='window' value='1'/></roulette>";
 
@@ -62,7 +59,7 @@ pub fn render(
 }
 
 fn whole(spp: u32, threads: usize, kept: Kept) -> Vec<u32> {
-    let (report, bits) = render(GUIDED, 1, spp, threads, kept, &Control::new()).expect("it renders");
+    let (report, bits) = render(&guided(100, ""), 1, spp, threads, kept, &Control::new()).expect("it renders");
     assert!(report.spp == spp && bits.iter().any(|bits| f32::from_bits(*bits) > 0.0));
     bits
 }
@@ -87,17 +84,20 @@ fn hc_p08_runs_from_the_same_file_have_the_same_bits() {
     assert_eq!(whole(100, 1, file(&first, false)), whole(100, 3, file(&second, false)));
     let on = fs::read(&first).expect("a file");
     assert!(on == fs::read(&second).expect("a file") && Learnt::of_bytes(&on).expect("sound").spp >= 2 * begun.spp);
-    assert!(render(GUIDED, 1, 8, 2, file(&folder.join("none"), true), &Control::new()).is_err(), "nothing to freeze");
+    assert!(
+        render(&guided(100, ""), 1, 8, 2, file(&folder.join("none"), true), &Control::new()).is_err(),
+        "nothing to freeze"
+    );
 }
 
 /// Guides that know where light is give less noise from the first sample on.
 #[test]
 fn a_run_that_begins_with_a_file_has_less_noise() {
     let learnt = folder("noise").join("file");
-    let (_, reference) = render(GUIDED, 0, 4096, 2, Kept::default(), &Control::new()).expect("it renders");
-    render(GUIDED, 0, 512, 2, file(&learnt, false), &Control::new()).expect("it renders");
+    let (_, reference) = render(&guided(100, ""), 0, 4096, 2, Kept::default(), &Control::new()).expect("it renders");
+    render(&guided(100, ""), 0, 512, 2, file(&learnt, false), &Control::new()).expect("it renders");
     let error = |kept: Kept| {
-        let (_, bits) = render(GUIDED, 0, 32, 2, kept, &Control::new()).expect("it renders");
+        let (_, bits) = render(&guided(100, ""), 0, 32, 2, kept, &Control::new()).expect("it renders");
         let pairs = bits.iter().zip(&reference).map(|(a, b)| (f32::from_bits(*a), f32::from_bits(*b)));
         pairs.map(|(a, b)| f64::from((a - b).powi(2) / (b * b + 0.01))).sum::<f64>() / reference.len() as f64
     };
@@ -114,7 +114,8 @@ fn a_file_of_another_scene_or_guide_is_refused() {
     let path = folder("other").join("file");
     whole(16, 2, file(&path, false));
     let told = |number: usize| {
-        let refused = render(GUIDED, number, 16, 2, file(&path, false), &Control::new()).expect_err("refused");
+        let refused =
+            render(&guided(100, ""), number, 16, 2, file(&path, false), &Control::new()).expect_err("refused");
         refused.to_string()
     };
     let other = told(0);
@@ -274,14 +275,15 @@ fn hc_x02_an_interrupted_guided_run_has_the_same_bits() {
         |pixels| 58 * pixels + 7,
     ];
     let after: [&[u32]; 7] = [&[3], &[8], &[11], &[19], &[30], &[45], &[2, 9, 10, 23, 40]];
-    interruptions_leave_no_trace("interrupted", GUIDED, &after, &inside);
+    interruptions_leave_no_trace("interrupted", &guided(100, ""), &after, &inside);
+    interruptions_leave_no_trace("interrupted_left", &left_to_the_bsdf(100), &[&[11], &[2, 9, 23, 40]], &inside[2..]);
 }
 
 /// Roulette that goes by what was found for the pixel and by what scattering has brought finds both again, with a guide
 /// and without one.
 #[test]
 fn hc_x02_an_interrupted_run_with_learnt_roulette_has_the_same_bits() {
-    let both = format!("{GUIDED}{ADJOINT}");
+    let both = format!("{}{ADJOINT}", guided(100, ""));
     for (test, nested) in [("interrupted_adjoint", ADJOINT), ("interrupted_both", &both)] {
         let inside: [fn(u64) -> u64; 2] = [|pixels| 5 * pixels + pixels / 2, |pixels| 40 * pixels + 7];
         interruptions_leave_no_trace(test, nested, &[&[3], &[11], &[2, 9, 23, 40]], &inside);
@@ -294,9 +296,12 @@ fn hc_i22_other_checkpoints_are_refused() {
     let folder = folder("refused");
     let path = folder.join("state");
     let kept = |of: Checkpoint| Kept { guide_file: None, checkpoint: Some(of) };
-    render(GUIDED, 1, 20, 2, kept(checkpoint(&path, 0.0)), &Control::new()).expect("it renders");
+    render(&guided(100, ""), 1, 20, 2, kept(checkpoint(&path, 0.0)), &Control::new()).expect("it renders");
     let told = |of: Checkpoint| {
-        render(GUIDED, 1, 20, 2, kept(of), &Control::new()).err().map(|e| e.to_string()).expect("it is refused")
+        render(&guided(100, ""), 1, 20, 2, kept(of), &Control::new())
+            .err()
+            .map(|e| e.to_string())
+            .expect("it is refused")
     };
     let mut other = checkpoint(&path, 0.0);
     other.of[0].1 = "2".to_owned();

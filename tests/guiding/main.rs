@@ -28,6 +28,23 @@ fn scene(text: &str, integrator: &str) -> Scene {
     instantiate(&registry, description, false).unwrap_or_else(|e| panic!("{e}")).scene
 }
 
+/// A guide with small cells, so that there are many, and several iterations; paths are guided to the end.
+fn guided(spatial_threshold: u32, more: &str) -> String {
+    sd_tree(spatial_threshold, 0, more)
+}
+
+/// One that leaves paths to the BSDF as soon as it can tell what it gains.
+fn left_to_the_bsdf(spatial_threshold: u32) -> String {
+    sd_tree(spatial_threshold, 20, "")
+}
+
+fn sd_tree(spatial_threshold: u32, least_gain: u32, more: &str) -> String {
+    format!(
+        "<guide type='sd_tree'><float name='spatial_threshold' value='{spatial_threshold}'/>
+         <float name='least_gain' value='{least_gain}'/><float name='learning' value='0.4'/>{more}</guide>"
+    )
+}
+
 /// Four small scenes with what a guide may do wrong: light from below and through a gap, glass and mirrors, BSDFs of smooth
 /// and delta lobes, transmission, light from everywhere and from a point.
 const SCENES: [(&str, &str); 4] = [

@@ -1,7 +1,7 @@
 //! Roulette that goes by what was learnt: unbiased whatever that is, and of effect.
 
 use super::unbiased::{agree, path};
-use super::{SCENES, scene};
+use super::{SCENES, guided, scene};
 use crate::support::render;
 use lucerna::core::color::Rgb;
 use lucerna::core::interfaces::{Goal, Guide, Outlook, PathState, Roulette, continuations};
@@ -86,7 +86,7 @@ const LEARNT: [&str; 2] = ["adjoint", "efficiency"];
 
 #[test]
 fn roulette_by_what_was_learnt_is_unbiased() {
-    let guide = "<guide type='sd_tree'><float name='spatial_threshold' value='200'/><float name='learning' value='0.4'/></guide>";
+    let guide = guided(200, "");
     let mut ways: Vec<String> = LEARNT.iter().map(|name| format!("<roulette type='{name}'/>")).collect();
     ways.push("<roulette type='adjoint'><float name='window' value='1'/></roulette>".to_owned());
     ways.extend(["throughput", "adjoint", "efficiency"].map(|name| format!("{guide}<roulette type='{name}'/>")));
@@ -190,9 +190,9 @@ fn paths_end_and_split() {
 
 #[test]
 fn the_number_of_threads_changes_no_bit() {
-    let guide = "<guide type='sd_tree'><float name='spatial_threshold' value='100'/><float name='learning' value='0.4'/></guide>";
+    let guide = guided(100, "");
     for name in LEARNT {
-        for guide in ["", guide] {
+        for guide in ["", &guide] {
             let picture = |threads: usize| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads start");
                 pool.install(|| {
@@ -214,12 +214,12 @@ fn the_number_of_threads_changes_no_bit() {
 /// What is there without a roulette, under its name.
 #[test]
 fn throughput_and_adjoint_are_the_defaults() {
-    let guide = "<guide type='sd_tree'><float name='spatial_threshold' value='100'/><float name='learning' value='0.4'/></guide>";
+    let guide = guided(100, "");
     let data = |more: &str| render(&scene(SCENES[1].1, &path(30, more)), 24, 1, SampleOrder::PerSample).0.data;
     assert!(data("") == data("<roulette type='throughput'/>"));
     assert!(data("") == data("<roulette type='albedo'/>"));
-    assert!(data(guide) == data(&format!("{guide}<roulette type='adjoint'/>")));
+    assert!(data(&guide) == data(&format!("{guide}<roulette type='adjoint'/>")));
     for other in ["throughput", "albedo"] {
-        assert!(data(guide) != data(&format!("{guide}<roulette type='{other}'/>")), "{other}");
+        assert!(data(&guide) != data(&format!("{guide}<roulette type='{other}'/>")), "{other}");
     }
 }

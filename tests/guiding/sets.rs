@@ -2,7 +2,7 @@
 
 use super::field::{self, REFLECTS, hit, record};
 use super::kept::{SETS, UNIT, checkpoint, file, folder, render, trained};
-use super::scene;
+use super::{guided, scene};
 use crate::support::render_with;
 use lucerna::core::interfaces::{Arena, GuideField, GuideRecord, GuidedVertex};
 use lucerna::core::math::{Vec2, Vec3};
@@ -19,10 +19,7 @@ const UNIFORM: f32 = 0.25 / PI;
 const FIRST: GuidedVertex = GuidedVertex { primary: true, ..REFLECTS };
 
 fn of_sets(sets: &str, threshold: u32, more: &str) -> String {
-    format!(
-        "<guide type='sd_tree'><float name='spatial_threshold' value='{threshold}'/><float name='learning' value='0.4'/>
-         <string name='sets' value='{sets}'/>{more}</guide>"
-    )
+    guided(threshold, &format!("<string name='sets' value='{sets}'/>{more}"))
 }
 
 /// What is learnt on a floor below a lamp, half of which is hidden, beside a wall that it lights.

@@ -1,6 +1,6 @@
 //! Guided pictures agree with those of `path`, however good or bad the guide is.
 
-use super::{SCENES, corrupted, scene};
+use super::{SCENES, corrupted, guided, left_to_the_bsdf, scene};
 use crate::support::{render, render_with};
 use lucerna::core::image::Image;
 use lucerna::core::render::{GuideFile, SampleOrder};
@@ -52,10 +52,7 @@ pub fn agree(scenes: &[(&str, &str)], guides: &[String], depth: u32, spp: u32) -
 
 #[test]
 fn hc_p06_every_setting_of_the_tree_is_unbiased() {
-    // Many cells, several iterations, and guided to the end.
-    let small = "<float name='spatial_threshold' value='200'/><float name='learning' value='0.4'/>";
-    let guide = |more: &str| format!("<guide type='sd_tree'>{small}<float name='least_gain' value='0'/>{more}</guide>");
-    let left = format!("<guide type='sd_tree'>{small}<float name='least_gain' value='20'/></guide>");
+    let guide = |more: &str| guided(200, more);
     let guides = [
         guide(""),
         guide("<string name='nee' value='never'/>"),
@@ -63,7 +60,7 @@ fn hc_p06_every_setting_of_the_tree_is_unbiased() {
         guide("<string name='product' value='none'/><string name='spatial_filter' value='box'/>"),
         guide("<float name='roughness_threshold' value='0'/><string name='combination' value='last'/>"),
         guide("<float name='p_guide' value='0'/>"),
-        left,
+        left_to_the_bsdf(200),
         guide("<float name='prior' value='0'/><float name='memory' value='0'/>"),
         guide("<string name='product' value='resampling'/>"),
         guide("<string name='sets' value='direct_indirect'/>"),
@@ -137,9 +134,8 @@ fn hc_p06_a_selection_probability_of_one_is_unbiased() {
     let wrong = |way: &str| {
         format!("<guide type='corrupted'><string name='way' value='{way}'/><float name='p_guide' value='1'/></guide>")
     };
-    let right =
-        "<guide type='sd_tree'><float name='spatial_threshold' value='200'/><float name='p_guide' value='1'/></guide>";
-    let guides = [right.to_owned(), wrong("inverted"), wrong("random"), wrong("one_cell")];
+    let right = guided(200, "<float name='p_guide' value='1'/>");
+    let guides = [right, wrong("inverted"), wrong("random"), wrong("one_cell")];
     let scenes = [SCENES[0], SCENES[2]];
     let blind = agree(&scenes, &guides, 3, 128);
     measured(
@@ -160,10 +156,10 @@ fn hc_p06_guides_from_files_are_unbiased() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("guiding").join("unbiased");
     let _ = std::fs::remove_dir_all(&folder);
     std::fs::create_dir_all(&folder).expect("a folder");
-    let guide = "<guide type='sd_tree'><float name='spatial_threshold' value='200'/></guide>";
+    let guide = guided(200, "");
     let scenes = [SCENES[0], SCENES[2]];
     for (name, text) in scenes {
-        let scene = scene(text, &path(9, guide));
+        let scene = scene(text, &path(9, &guide));
         let shot = |seed: u32| {
             let path = folder.join(format!("{name} {seed}"));
             let with = |frozen: bool| {
@@ -174,9 +170,9 @@ fn hc_p06_guides_from_files_are_unbiased() {
             with(true)
         };
         let shots: Vec<Image> = (0..SEEDS).map(shot).collect();
-        let guided = Measured::of(&shots, &["R", "G", "B"].map(str::to_owned)).expect("ten pictures of a size");
+        let found = Measured::of(&shots, &["R", "G", "B"].map(str::to_owned)).expect("ten pictures of a size");
         let plain = pictures(text, &path(9, ""), 2 * SPP, 1000);
-        let found = compare(&guided, &plain, true, sidak(0.01, scenes.len())).expect("of a kind");
+        let found = compare(&found, &plain, true, sidak(0.01, scenes.len())).expect("of a kind");
         assert!(found.agrees(), "{name}: {:?}", found.mean_difference());
     }
 }
@@ -203,7 +199,7 @@ fn hc_p12_an_open_sky_is_hardly_worse_guided() {
     let plain = cost(&path(9, ""));
     let mut found = Vec::new();
     for product in ["cosine", "resampling"] {
-        let guide = format!("<guide type='sd_tree'><string name='product' value='{product}'/></guide>");
+        let guide = guided(500, &format!("<string name='product' value='{product}'/>"));
         let ratio = cost(&path(9, &guide)) / plain;
         assert!(ratio < 1.25, "{product}: {ratio:.3}");
         found.push(format!("{ratio:.2} times with the product by {product}"));

@@ -12,7 +12,7 @@
 
 use super::Settings;
 use super::field::{Field, Leaf};
-use super::gain::{self, Gain};
+use super::gain::Gain;
 use super::learner::{Cell, Learner};
 use super::mixing::Mixing;
 use super::outlook;
@@ -60,7 +60,7 @@ impl Learner {
         to.u64(self.taken);
         to.u32(self.iterations);
         to.u16(self.full.into());
-        to.u16(self.left.into());
+        to.u16((!self.field.guides).into());
         to.u16(sets::number(self.settings.sets) as u16);
         self.tree.pack(&mut to);
         let (mut trees, mut numbers) = (Vec::new(), HashMap::new());
@@ -136,7 +136,7 @@ impl Learner {
         field.guides = !left;
         field.validate().map_err(IoError::new)?;
         let field = Arc::new(field);
-        Ok(Learner { settings, tree, cells, apart, field, taken, iterations, full, left })
+        Ok(Learner { settings, tree, cells, apart, field, taken, iterations, full })
     }
 
     /// What it holds, in numbers.
@@ -157,7 +157,6 @@ impl Learner {
         };
         let p_mean = leaves.iter().map(|leaf| f64::from(leaf.p_guide)).sum::<f64>() / leaves.len() as f64;
         let known = || leaves.iter().filter(|leaf| leaf.directions.is_some());
-        let gain = gain::mean(self.cells.iter().map(|cell| &cell.gain)).unwrap_or(0.0);
         let mut facts = vec![
             ("iterations", FactValue::Count(self.iterations.into())),
             ("records", FactValue::Count(self.taken)),
@@ -168,13 +167,13 @@ impl Learner {
             ("nodes per lit cell", FactValue::Number(nodes as f64 / (lit as f64).max(1.0))),
             ("depth of directions", FactValue::Count(deepest as u64)),
             ("mean probability of the guide", FactValue::Number(p_mean)),
-            ("mean gain in nats", FactValue::Number(gain)),
             ("probability of the guide", range(&mut known().map(|leaf| leaf.p_guide))),
             ("fluence", range(&mut known().map(|leaf| leaf.fluence))),
             ("memory in MiB", FactValue::Number(self.bytes() as f64 / f64::from(1 << 20))),
             ("cells of space by depth", FactValue::PerDepth(spatial)),
             ("cells of directions by depth", FactValue::PerDepth(directional[..=deepest].to_vec())),
         ];
+        facts.extend(self.gain().map(|gain| ("mean gain in nats", FactValue::Number(gain))));
         let names = match self.settings.sets {
             GuideSets::One => None,
             GuideSets::DirectIndirect => Some([

@@ -17,7 +17,7 @@
 //! | weights of iterations | inverse mean variance of themselves | of the other half of the pixels |
 //! | roulette | none, or by the light ahead | by the light ahead, learnt for each side of surfaces in a cell |
 //! | iterations at the start, then | 8 of 1 sample, then 1, 2, 4, … | 8 of 1 sample, then as many as all before: 8, 16, 32, … |
-//! | the last iteration | as long as two would be, guided by an eighth of all samples | begins once a tenth of the budget is spent: learning costs more than it brings then |
+//! | the last iteration | as long as two would be, guided by an eighth of all samples | begins once a tenth of the budget is spent, since samples that are learnt from take longer |
 
 use super::cylinder;
 use super::field::{Field, Leaf};
@@ -56,8 +56,6 @@ pub struct Learner {
     pub(super) iterations: u32,
     /// The limit of memory was reached.
     pub(super) full: bool,
-    /// Paths are left to the BSDF, since [too little is gained](gain).
-    pub(super) left: bool,
 }
 
 /// A cell of space that is filled.
@@ -98,7 +96,7 @@ impl Learner {
             sets,
             apart.iter().map(|apart| apart.leaf(&cells[0], &settings)).collect(),
         ));
-        Learner { settings, tree, cells, apart, field, taken: 0, iterations: 0, full: false, left: false }
+        Learner { settings, tree, cells, apart, field, taken: 0, iterations: 0, full: false }
     }
 
     /// Where the record goes, with the part of it in each cell.
@@ -158,6 +156,11 @@ impl Learner {
             *place += 1;
         }
         sorted
+    }
+
+    /// What is gained over the BSDF, in nats, if that is known.
+    pub(super) fn gain(&self) -> Option<f64> {
+        gain::mean(self.cells.iter().map(|cell| &cell.gain))
     }
 
     /// Bytes of everything.
@@ -275,7 +278,7 @@ impl GuideLearner for Learner {
 
     fn learn_outlook(&mut self, tiles: &[Vec<VertexRecord>]) {
         let parts = self.parts(tiles, |record, _, put| put(self.tree.leaf(self.tree.cell(record.p)).0, 1.0));
-        let alone = !self.settings.directions || self.left;
+        let alone = !self.settings.directions || !self.field.guides;
         filled(&mut self.cells, &parts).into_par_iter().for_each(|(cell, parts)| {
             for part in parts {
                 let record = &tiles[part.tile as usize][part.record as usize];
@@ -286,10 +289,9 @@ impl GuideLearner for Learner {
     }
 
     fn refine(&mut self, spp: u32) {
-        if self.settings.may_leave() && !self.left && self.iterations + 1 >= self.settings.trial {
-            let gain = gain::mean(self.cells.iter().map(|cell| &cell.gain));
-            self.left = gain.is_some_and(|gain| gain < self.settings.least_gain);
-        }
+        let judged = self.settings.may_leave() && self.iterations + 1 >= self.settings.trial;
+        let too_little = judged && self.gain().is_some_and(|gain| gain < self.settings.least_gain);
+        let guides = self.field.guides && !too_little;
         let p_guide = self.settings.p_guide;
         let total: f64 = self.cells.iter().map(|cell| cell.sums.total()).sum();
         if total > 0.0 && total.is_finite() {
@@ -305,7 +307,10 @@ impl GuideLearner for Learner {
         self.fade();
         self.cells.iter_mut().for_each(|cell| {
             cell.count *= self.settings.memory;
-            cell.gain.fade(self.settings.memory);
+            // By what the guide was judged is told as long as nothing more is found.
+            if guides {
+                cell.gain.fade(self.settings.memory);
+            }
         });
         self.apart.iter_mut().for_each(|apart| apart.count *= self.settings.memory);
         let leaf = |cell: &Cell| Leaf {
@@ -317,7 +322,7 @@ impl GuideLearner for Learner {
         let leaves = self.cells.iter().map(leaf).collect();
         let Settings { cosine, sets, .. } = self.settings;
         let mut field = Field::new(self.tree.clone(), leaves, cosine, sets, self.apart_leaves());
-        field.guides = !self.left;
+        field.guides = guides;
         self.field = Arc::new(field);
         self.iterations += 1;
     }
@@ -340,7 +345,7 @@ impl GuideLearner for Learner {
             nodes as f64 / count,
         )];
         lines.extend(self.apart_summary());
-        if self.left {
+        if !self.field.guides {
             lines.push("sd_tree: it gains too little here, and leaves the picture to the BSDF (least_gain)".to_owned());
         }
         if self.full {

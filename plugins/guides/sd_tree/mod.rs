@@ -40,9 +40,9 @@
 //! Two `sets` have to share what is found and cost time; whether they pay in a scene tells
 //! `lucerna compare scene.xml -m path+guide=sd_tree path+guide=sd_tree:sets=direct_indirect`.
 //!
-//! Whether to guide at all is decided by `least_gain` when the start is over, and after each iteration that learns: for the
-//! rest of the run, since what does not pay by then has too little left to pay for itself. Dear rays pay earlier than cheap
-//! ones, which the threshold does not know: `sd_tree:least_gain=0` in `compare` tells.
+//! Whether to guide at all is decided by `least_gain` when the start is over, and again after each iteration that learns; once
+//! left to the BSDF, the picture stays so. The threshold knows nothing of what rays cost: whether it is right for a scene
+//! tells `lucerna compare scene.xml -m path+roulette=adjoint path+guide=sd_tree:least_gain=0`.
 //!
 //! Limits. A cell of space has one distribution for all its points: a bright spot near by is blurred by parallax until
 //! the cells are small, which takes millions of samples. Small or short renders, and those whose noise comes from
@@ -92,8 +92,8 @@ use lucerna_core::render::Learnt;
 use lucerna_core::scene::{Built, Constructor, Failed, Param, Plugin, Properties};
 use std::sync::Arc;
 
-/// The part of the budget in which something is learnt: notes cost about as much time as they save in what is left, if
-/// that is less than ten times as long.
+/// The part of the budget in which something is learnt. Samples that are learnt from take longer, and what they teach has to
+/// pay for that in what is left.
 const LEARNING: f64 = 0.1;
 
 /// Iterations after which the guide is judged, where the start has fewer.
