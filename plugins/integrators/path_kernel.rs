@@ -29,8 +29,8 @@ struct Branch<'v, H> {
     depth: u32,
     /// How many are still to go on.
     left: Cell<u32>,
-    /// What their random numbers depend on.
-    key: u64,
+    /// The splits of the camera sample before: what their random numbers depend on.
+    before: u32,
     /// The one before, whose turn comes afterwards.
     below: Option<&'v Branch<'v, H>>,
 }
@@ -116,16 +116,16 @@ pub(super) fn trace<'v, D: Directions<Here: 'v>, R: Decides>(
                     if count == 0 {
                         break 'path;
                     }
-                    splits += count - 1;
                     throughput *= 1.0 / wanted;
                 }
                 directions.note_fork(place, count, 1.0 / wanted, found.rays);
                 if count > 1 {
-                    let (left, key) = (Cell::new(count - 1), stream.key());
+                    let (left, before) = (Cell::new(count - 1), splits);
+                    splits += count - 1;
                     let prospects = directions.mark();
                     let below = branch;
                     branch =
-                        Some(arena.alloc(Branch { hit, here, throughput, prospects, eta, depth, left, key, below }));
+                        Some(arena.alloc(Branch { hit, here, throughput, prospects, eta, depth, left, before, below }));
                 }
             }
             let from = lights.vertex(&hit, lobes);
@@ -188,7 +188,7 @@ pub(super) fn trace<'v, D: Directions<Here: 'v>, R: Decides>(
         directions.resume(next.prospects);
         resumed = Some(next.here);
         let left = next.left.get();
-        *stream = Stream::branch(next.key, left);
+        stream.enter_branch(next.before + left);
         next.left.set(left - 1);
         if left == 1 {
             branch = next.below;

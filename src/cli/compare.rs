@@ -234,13 +234,19 @@ fn print(result: &SceneResult, options: &Options) {
             match (&method.failed, method.stops.get(budget).and_then(|at| method.points.get(*at))) {
                 (Some(why), _) => println!("    {label}  failed: {why}"),
                 (None, Some(point)) => println!(
-                    "    {label}  {:>6} spp  {:>8.3} s  relMSE {:.3e}  efficiency {}  mean {}{}",
+                    "    {label}  {:>6} spp  {:>8.3} s  relMSE {:.3e}  efficiency {}{}  mean {}{}",
                     point.spp,
                     point.time().value,
                     point.mean(|e| e.rel_mse).value,
                     match result.gain(i, budget, |e| e.rel_mse) {
                         _ if i == result.baseline => "1 × (baseline)".to_owned(),
                         gain => gain.map_or_else(|| "-".to_owned(), |g| page::times(&g)),
+                    },
+                    match result.gain_without_noise(i, budget) {
+                        Some(gain) if i != result.baseline && result.truth.reached == Some(false) => {
+                            format!(" ({} without the reference's noise)", page::times(&gain))
+                        }
+                        _ => String::new(),
                     },
                     percent(&point.mean_difference(&result.truth)),
                     if result.is_biased(point) == Some(true) { " (biased)" } else { "" },

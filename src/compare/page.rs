@@ -221,7 +221,10 @@ fn section(scene: &SceneResult, number: usize, options: &Options) -> Result<Stri
     let noise = match (truth.noise, truth.reached) {
         (None, _) => "its noise is not known".to_owned(),
         (Some([mse, ..]), Some(false)) => {
-            format!("its noise, {} in MSE, is <b>above a hundredth of the best method’s error</b>", digits(mse))
+            format!(
+                "its noise, {} in MSE, is <b>above a hundredth of the best method’s error</b> (results.json also has efficiencies without it)",
+                digits(mse)
+            )
         }
         (Some([mse, ..]), _) => format!("its noise adds {} to an MSE", digits(mse)),
     };

@@ -218,6 +218,18 @@ impl SceneResult {
         Interval::of_ratio(&ours.efficiencies(measure), &base.efficiencies(measure))
     }
 
+    /// The same by relMSE, without what the noise of the reference adds to both errors; `None` if that is not known, or half
+    /// of an error.
+    pub fn gain_without_noise(&self, method: usize, budget: usize) -> Option<Interval> {
+        let [_, noise, _] = self.truth.noise?;
+        let without = |point: &Point| {
+            let told = point.errors.iter().all(|e| e.rel_mse > 2.0 * noise);
+            told.then(|| point.efficiencies(|e| e.rel_mse - noise))
+        };
+        let (ours, base) = self.pair(method, budget)?;
+        Interval::of_ratio(&without(ours)?, &without(base)?)
+    }
+
     /// Time of a sample over the baseline's, by the clock: above 1 is slower.
     pub fn slowdown(&self, method: usize, budget: usize) -> Option<Interval> {
         let (ours, base) = self.pair(method, budget)?;
@@ -304,9 +316,26 @@ mod tests {
         let scene = SceneResult { scene: PathBuf::new(), truth, methods: vec![base, slower], baseline: 0 };
         let gain = scene.gain(1, 0, |e| e.rel_mse).unwrap();
         assert!((gain.value - 2.0).abs() < 1e-9, "half of the error in the same time: {gain:?}");
+        assert_eq!(scene.gain_without_noise(1, 0), None);
         assert!((scene.processor_slowdown(1, 0).unwrap().value - 1.5).abs() < 1e-9);
         assert!((scene.slowdown(1, 0).unwrap().value - 1.0).abs() < 1e-9);
         assert_eq!(scene.target(Some(0.5)), Some(0.5));
         assert!((scene.target(None).unwrap() - 0.075).abs() < 1e-4);
+        // Noise that both errors have hides a part of what is gained, or all.
+        let noisy = |noise: f64| {
+            let mut methods = scene.methods.clone();
+            let errors = methods.iter_mut().flat_map(|method| &mut method.points).flat_map(|point| &mut point.errors);
+            errors.for_each(|e| e.rel_mse += noise);
+            SceneResult {
+                scene: PathBuf::new(),
+                truth: Truth { noise: Some([0.0, noise, 0.0]), ..scene.truth.clone() },
+                methods,
+                baseline: 0,
+            }
+        };
+        let found = noisy(0.03);
+        assert!(found.gain(1, 0, |e| e.rel_mse).unwrap().value < 1.6);
+        assert!((found.gain_without_noise(1, 0).unwrap().value - 2.0).abs() < 1e-9);
+        assert_eq!(noisy(0.04).gain_without_noise(1, 0), None);
     }
 }

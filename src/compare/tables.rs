@@ -53,6 +53,7 @@ fn scene_json(scene: &SceneResult, options: &Options) -> Value {
                 "against_baseline": {
                     "efficiency_mse": scene.gain(i, budget, |e| e.mse).map(interval),
                     "efficiency_rel_mse": scene.gain(i, budget, |e| e.rel_mse).map(interval),
+                    "efficiency_rel_mse_without_noise": scene.gain_without_noise(i, budget).map(interval),
                     "efficiency_rel_mse_trimmed": scene.gain(i, budget, |e| e.rel_mse_trimmed).map(interval),
                     "seconds_per_sample": scene.slowdown(i, budget).map(interval),
                     "processor_seconds_per_sample": scene.processor_slowdown(i, budget).map(interval),

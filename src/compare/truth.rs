@@ -28,6 +28,7 @@ const LONGER: u32 = 8;
 const SEED: u32 = 1 << 30;
 
 /// What methods are compared with.
+#[derive(Clone)]
 pub struct Truth {
     /// Colour, channels interleaved.
     pub values: Vec<f32>,

@@ -43,6 +43,9 @@ const MOST_COARSENINGS: u32 = 10;
 /// A cell of directions is divided if its flux is worth so many records for each one that the prior is.
 const LEAST_WORTH: f64 = 0.5;
 
+/// Smaller parts of a record than this are taken with a probability, and count as much.
+const LEAST_SHARE: f32 = 0.25;
+
 /// The tree that is filled.
 pub struct Learner {
     pub(super) settings: Settings,
@@ -111,7 +114,13 @@ impl Learner {
         let size = SpatialTree::extent(depth);
         let low = [0, 1, 2].map(|axis: usize| cell[axis].saturating_sub(size[axis] / 2).min(EDGE - size[axis]));
         if self.settings.spatial_filter == SpatialFilter::Box {
-            return self.tree.overlaps(low, size, put);
+            // Of many small parts some are taken, for all: they would cost more than the rest of learning.
+            return self.tree.overlaps(low, size, &mut |leaf, share| {
+                let taken = (mix(number ^ u64::from(leaf) << 40) >> 40) as f32 / (1 << 24) as f32 * LEAST_SHARE < share;
+                if taken {
+                    put(leaf, share.max(LEAST_SHARE));
+                }
+            });
         }
         let random = mix(number);
         let jittered = [0, 1, 2].map(|axis: usize| {
@@ -388,5 +397,53 @@ pub(super) fn put(sums: &mut Sums, record: &GuideRecord, flux: f64, filter: Dire
     match filter {
         DirectionalFilter::Nearest => sums.add(p, flux),
         DirectionalFilter::Box => sums.add_box(p, flux),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::OUTLOOK;
+    use super::super::mixing::tests::found_in_a_part;
+    use super::*;
+    use lucerna_core::math::Vec3;
+    use lucerna_core::sampling::Pcg32;
+
+    /// Where cells are small beside the one that a record lies in, few of them get a part of it, and all what is due to them
+    /// in the mean.
+    #[test]
+    fn small_parts_are_taken_by_a_few_cells_for_all() {
+        let bounds = Aabb { min: Vec3::ZERO, max: Vec3::ONE };
+        let settings = Settings { spatial_filter: SpatialFilter::Box, spatial_threshold: 100.0, ..OUTLOOK };
+        let (mut learner, mut pcg) = (Learner::new(settings, bounds), Pcg32::new(1, 2));
+        let mut record = found_in_a_part(0.5, 0.1, 1.0, &mut pcg);
+        for _ in 0..12 {
+            let mut near_the_middle = |_| 0.5 - 0.2 * pcg.next_f32();
+            let at = |p| GuideRecord { p: Vec3::from_array(p), ..record };
+            let records = (0..2000).map(|_| at([0, 1, 2].map(&mut near_the_middle))).collect();
+            learner.learn(&[records]);
+            learner.refine(1);
+        }
+        record.p = Vec3::splat(0.51);
+        let cell = learner.tree.cell(record.p);
+        let size = SpatialTree::extent(learner.tree.leaf(cell).1);
+        let mut due = vec![0.0; learner.cells.len()];
+        learner
+            .tree
+            .overlaps([0, 1, 2].map(|i: usize| cell[i] - size[i] / 2), size, |leaf, share| due[leaf as usize] = share);
+        let overlapped = due.iter().filter(|share| **share > 0.0).count();
+        const RECORDS: u64 = 20_000;
+        let (mut parts, mut found) = (0, vec![0.0; due.len()]);
+        for number in 0..RECORDS {
+            learner.place(&record, number, &mut |leaf, share| {
+                parts += 1;
+                found[leaf as usize] += share / RECORDS as f32;
+            });
+        }
+        let each = f64::from(parts) / RECORDS as f64;
+        assert!(overlapped >= 20 && each < 5.0, "{each} parts of {overlapped}");
+        for (due, found) in due.iter().zip(&found) {
+            let error = (due * LEAST_SHARE / RECORDS as f32).sqrt();
+            assert!((due - found).abs() <= 4.5 * error + 1e-3 * due, "{due} {found}");
+        }
     }
 }

@@ -14,7 +14,7 @@
 //! | `directional_depth` | integer | 20 | levels of quadtrees at most, from 3 to 20 |
 //! | `prior` | float | 1 | what larger cells of space have found counts as much as so many records, and so does, inside a cell of directions, light from everywhere; 0 as published |
 //! | `memory` | float | 0.5 | part of what was found that still counts an iteration later; 0 as published |
-//! | `spatial_filter` | string | stochastic | records go to the cell they lie in (`nearest`), to one in a box about it (`stochastic`), or to all of the `box` by volume |
+//! | `spatial_filter` | string | stochastic | records go to the cell they lie in (`nearest`), to one in a box about it (`stochastic`), or to all of the `box` by volume (of small parts some are taken, for all) |
 //! | `directional_filter` | string | box | records go to the directions they lie in (`nearest`), or to all in a `box` about them by area |
 //! | `p_guide` | float | unset | probability of the guide, limited to 0.95; learnt if unset, up to 0.7 |
 //! | `least_gain` | float | 0.12 | if the mixture is closer than the BSDF alone to the light that is scattered by less than so many nats (divergence of Kullback and Leibler, mean over all vertices), the rest of the picture is left to the BSDF, and to roulette; 0: never. Only where `p_guide` is learnt and `sets` is `one` |
@@ -264,26 +264,28 @@ struct SdTree {
 /// Records after which a cell of space is halved where nothing but outlooks is learnt.
 const OUTLOOK_THRESHOLD: f64 = 500.0;
 
+/// What a tree over space alone goes by.
+const OUTLOOK: Settings = Settings {
+    spatial_threshold: OUTLOOK_THRESHOLD,
+    directional_threshold: 1.0,
+    depth: 0,
+    spatial_filter: SpatialFilter::Nearest,
+    directional_filter: DirectionalFilter::Nearest,
+    p_guide: Some(0.0),
+    least_gain: 0.0,
+    trial: 0,
+    prior: 0.0,
+    memory: 0.0,
+    cosine: false,
+    max_bytes: 64 << 20,
+    sets: GuideSets::One,
+    sets_asked: false,
+    directions: false,
+};
+
 /// The tree over space alone, for roulette of paths that are not guided. All samples count alike, since none is guided
 /// worse than others.
 pub(crate) fn outlook_alone() -> Arc<dyn Guide> {
-    let settings = Settings {
-        spatial_threshold: OUTLOOK_THRESHOLD,
-        directional_threshold: 1.0,
-        depth: 0,
-        spatial_filter: SpatialFilter::Nearest,
-        directional_filter: DirectionalFilter::Nearest,
-        p_guide: Some(0.0),
-        least_gain: 0.0,
-        trial: 0,
-        prior: 0.0,
-        memory: 0.0,
-        cosine: false,
-        max_bytes: 64 << 20,
-        sets: GuideSets::One,
-        sets_asked: false,
-        directions: false,
-    };
     let training = Training {
         startup: 4,
         ending: Ending::Doubling,
@@ -294,7 +296,7 @@ pub(crate) fn outlook_alone() -> Arc<dyn Guide> {
         least_roughness: 0.0,
         candidates: 1,
     };
-    Arc::new(SdTree { settings, training, file: None })
+    Arc::new(SdTree { settings: OUTLOOK, training, file: None })
 }
 
 impl Guide for SdTree {

@@ -35,7 +35,7 @@ pub struct PathState {
 /// What is known of a pixel before a sample of it is taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Goal {
-    /// Its luminance; 0 where nothing is known.
+    /// Its luminance, brought nearer to the mean of the picture; 0 where nothing is known.
     pub image: f32,
     /// Square root of the mean cost of a sample over its mean relative variance, in the picture; 0 if unknown.
     pub effort: f32,

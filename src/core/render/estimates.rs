@@ -3,7 +3,7 @@
 //! The samples so far are summed over blocks of pixels, each level of blocks twice as wide as the one below. A block is
 //! estimated by its own samples and by the block around it, which counts as a few samples more: so the estimate is there
 //! from the first samples on and is refined up to single pixels, as the course "Path Guiding in Production" (2019,
-//! section 7.7) asks for. It stays the same during a pass.
+//! section 7.7) asks for. It stays the same during a pass. The goal lies between it and the mean of all.
 
 use super::combine::Moments;
 use crate::interfaces::Goal;
@@ -18,6 +18,10 @@ const PRIOR: f64 = 8.0;
 
 /// No pixel is taken for darker than this part of the picture's mean.
 const DARKEST: f64 = 0.02;
+
+/// The part that the picture as a whole has in the goal of a pixel. By its own estimate alone a dark pixel would get as
+/// much work as a bright one, though what is wrong there shows less; and bright ones, where few paths decide, too little.
+const WHOLE: f64 = 1.0 / 3.0;
 
 /// Samples per pixel from which the variance of the picture is believed.
 const ENOUGH_FOR_VARIANCE: f64 = 4.0;
@@ -116,6 +120,9 @@ impl Estimates {
             width = size.x as usize;
         }
         image.iter_mut().for_each(|image| *image = image.max(DARKEST * mean));
+        // Of logarithms, so that a lamp in view does not decide.
+        let whole = (image.iter().map(|image| image.ln()).sum::<f64>() / image.len() as f64).exp();
+        image.iter_mut().for_each(|image| *image = image.powf(1.0 - WHOLE) * whole.powf(WHOLE));
         let effort = (cost / self.relative_variance(&image)).sqrt() as f32;
         let effort = if effort.is_finite() { effort } else { 0.0 };
         self.goals = image.iter().map(|image| Goal { image: *image as f32, effort }).collect();
@@ -174,7 +181,10 @@ mod tests {
             }
             estimates.extend(32, &[moments]);
             estimates.update(3.0);
-            let off = |x: i32| (estimates.goal(IVec2::new(x, 2)).image / bright(x) - 1.0).abs();
+            // Of the picture as a whole: five columns of 4, eight of 1/4.
+            let whole = 4f32.powf((5.0 - 8.0) / 13.0);
+            let goal = |x: i32| bright(x).powf(2.0 / 3.0) * whole.powf(1.0 / 3.0);
+            let off = |x: i32| (estimates.goal(IVec2::new(x, 2)).image / goal(x) - 1.0).abs();
             let worst = (0..13).map(off).fold(0.0, f32::max);
             // What lies around a pixel is at most sixteen times as bright.
             assert!(worst < 15.0 * PRIOR as f32 / (n + PRIOR as f32), "{n}: {worst}");
@@ -182,7 +192,10 @@ mod tests {
             errors.push(worst);
         }
         let effort = estimates.goal(IVec2::new(7, 3)).effort;
-        assert!((effort / 3f32.sqrt() - 1.0).abs() < 0.1, "{effort}");
+        // Variance over the square of the goal: in the mean of five bright columns and eight dark ones.
+        let whole = 4f32.powf(-3.0 / 13.0);
+        let variance = (5.0 * (4.0 / whole).powf(2.0 / 3.0) + 8.0 * (0.25 / whole).powf(2.0 / 3.0)) / 13.0;
+        assert!((effort / (3.0 / variance).sqrt() - 1.0).abs() < 0.05, "{effort}");
         assert_eq!(estimates.goal(IVec2::new(13, 2)), Goal::default());
         assert_eq!(estimates.goal(IVec2::new(-1, 2)), Goal::default());
     }

@@ -1,11 +1,13 @@
 //! The numbers one pixel sample consumes.
 
 use super::Pcg32;
-use crate::interfaces::mix;
 use crate::math::{UVec2, Vec2};
 
 /// How many numbers a [`PointSet`] hands over per call.
 const BLOCK: usize = 8;
+
+/// Numbers of a kind that lie between those of two branches: more than a path consumes, and whole blocks.
+const FOR_ONE: u32 = 1 << 16;
 
 /// A set of well-distributed points, asked for in blocks so that no virtual call is made per number.
 ///
@@ -58,15 +60,14 @@ impl<'a> Stream<'a> {
         }))
     }
 
-    /// What the [`branch`](Self::branch)es of a path that splits depend on; drawn from this stream.
-    pub fn key(&mut self) -> u64 {
-        let u2 = self.next_2d();
-        u64::from(u2.x.to_bits()) << 32 | u64::from(u2.y.to_bits())
-    }
-
-    /// Independent numbers for one branch of several.
-    pub fn branch(key: u64, index: u32) -> Self {
-        Stream::independent(Pcg32::new(mix(key), mix(key ^ u64::from(index).rotate_right(16))))
+    /// Goes over to the numbers for a branch of a path that splits. Each of a pixel sample has a number of its own, from 1;
+    /// the branches of a number are as well distributed over the samples as the paths that they are of.
+    pub fn enter_branch(&mut self, number: u32) {
+        // Independent numbers are as good for one as for another.
+        if let Source::Structured(blocks) = &mut self.0 {
+            blocks.next_single = number.wrapping_mul(FOR_ONE);
+            blocks.next_pair = number.wrapping_mul(FOR_ONE);
+        }
     }
 
     /// The next number.
@@ -108,5 +109,37 @@ impl Blocks<'_> {
         }
         self.next_pair += 1;
         self.pairs[slot]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every number tells its dimension.
+    struct Dimensions;
+
+    impl PointSet for Dimensions {
+        fn singles(&self, _: UVec2, _: u32, first: u32, out: &mut [f32]) {
+            (first..).zip(out).for_each(|(dimension, out)| *out = dimension as f32);
+        }
+
+        fn pairs(&self, _: UVec2, _: u32, first: u32, out: &mut [Vec2]) {
+            (first..).zip(out).for_each(|(dimension, out)| *out = Vec2::splat(dimension as f32));
+        }
+    }
+
+    #[test]
+    fn branches_have_numbers_of_their_own() {
+        let mut stream = Stream::structured(&Dimensions, UVec2::ZERO, 0);
+        for vertex in 0..2 {
+            let first = (2 * vertex) as f32;
+            assert_eq!([stream.next_1d(), stream.next_1d(), stream.next_2d().y], [first, first + 1.0, vertex as f32]);
+        }
+        for number in [1, 2, 1000] {
+            stream.enter_branch(number);
+            let first = (number * FOR_ONE) as f32;
+            assert_eq!([stream.next_1d(), stream.next_1d(), stream.next_2d().x], [first, first + 1.0, first]);
+        }
     }
 }
