@@ -3,12 +3,9 @@
 //! tests say so.
 
 use super::corrupted;
-use crate::support::render;
+use super::unbiased::pictures_of;
 use lucerna::compare::method::Method;
-use lucerna::core::image::Image;
-use lucerna::core::render::SampleOrder;
 use lucerna::core::scene::{Scene, instantiate, xml};
-use lucerna::core::stats::Measured;
 use lucerna::core::stats::chi2::sidak;
 use lucerna::core::stats::figures::measured;
 use lucerna::core::stats::images::{Scale, compare};
@@ -16,8 +13,6 @@ use std::path::{Path, PathBuf};
 
 /// Pixels of a picture.
 const SIZE: [u32; 2] = [48, 32];
-/// Independent pictures of each method.
-const SEEDS: u32 = 10;
 /// Samples per pixel of each; of `path` four times as many.
 const SPP: u32 = 64;
 
@@ -51,8 +46,7 @@ fn scenes(folder: &Path) -> Vec<PathBuf> {
         paths.sort();
         paths
     };
-    let is_scene =
-        |path: &&PathBuf| path.extension().is_some_and(|e| e == "xml") && load(path, &self::path(-1)).is_some();
+    let is_scene = |file: &&PathBuf| file.extension().is_some_and(|e| e == "xml") && load(file, &path(-1)).is_some();
     files(folder).iter().filter_map(|folder| files(folder).iter().rev().find(is_scene).cloned()).collect()
 }
 
@@ -66,12 +60,6 @@ fn load(file: &Path, method: &str) -> Option<Scene> {
     instantiate(&registry, description, false).ok().map(|built| built.scene)
 }
 
-fn pictures(scene: &Scene, spp: u32, first_seed: u32) -> Measured {
-    let shots: Vec<Image> =
-        (0..SEEDS).map(|seed| render(scene, spp, first_seed + seed, SampleOrder::PerSample).0).collect();
-    Measured::of(&shots, &["R", "G", "B"].map(str::to_owned)).expect("ten pictures of a size")
-}
-
 /// Compares `decisions` at paths of this depth (-1: any) with `path`, in all scenes.
 fn agree(test: &str, depth: i32, decisions: &[String], spp: u32) {
     let Some(folder) = std::env::var_os("LUCERNA_SCENES") else {
@@ -82,10 +70,10 @@ fn agree(test: &str, depth: i32, decisions: &[String], spp: u32) {
     let level = sidak(0.01, scenes.len() * decisions.len());
     let (mut failures, mut blind) = (Vec::new(), 0.0_f64);
     for file in &scenes {
-        let plain = pictures(&load(file, &path(depth)).expect("loaded before"), 4 * spp, 1000);
+        let plain = pictures_of(&load(file, &path(depth)).expect("loaded before"), 4 * spp, 1000);
         for (i, decision) in decisions.iter().enumerate() {
             let method = format!("{}{decision}", path(depth));
-            let guided = pictures(&load(file, &method).expect("a method"), spp, 100 * (i as u32 + 20));
+            let guided = pictures_of(&load(file, &method).expect("a method"), spp, 100 * (i as u32 + 20));
             let found = compare(&guided, &plain, true, level).expect("of a kind");
             let (difference, error) = found.mean_difference();
             let told =

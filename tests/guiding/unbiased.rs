@@ -4,6 +4,7 @@ use super::{SCENES, corrupted, guided, left_to_the_bsdf, scene};
 use crate::support::{render, render_with};
 use lucerna::core::image::Image;
 use lucerna::core::render::{GuideFile, SampleOrder};
+use lucerna::core::scene::Scene;
 use lucerna::core::stats::Measured;
 use lucerna::core::stats::chi2::sidak;
 use lucerna::core::stats::figures::measured;
@@ -14,9 +15,13 @@ use std::path::Path;
 const SEEDS: u32 = 10;
 
 fn pictures(text: &str, integrator: &str, spp: u32, first_seed: u32) -> Measured {
-    let scene = scene(text, integrator);
+    pictures_of(&scene(text, integrator), spp, first_seed)
+}
+
+/// Independent pictures of a scene.
+pub fn pictures_of(scene: &Scene, spp: u32, first_seed: u32) -> Measured {
     let shots: Vec<Image> =
-        (0..SEEDS).map(|seed| render(&scene, spp, first_seed + seed, SampleOrder::PerSample).0).collect();
+        (0..SEEDS).map(|seed| render(scene, spp, first_seed + seed, SampleOrder::PerSample).0).collect();
     Measured::of(&shots, &["R", "G", "B"].map(str::to_owned)).expect("ten pictures of a size")
 }
 

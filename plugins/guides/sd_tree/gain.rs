@@ -7,8 +7,8 @@
 //! space by the light there, and then over all cells by their records, so that dark places count as bright ones.
 //!
 //! `lucerna guide info` tells it. After `lucerna render SCENE --size 96x54 --sampler sobol --spp 16 --guide sd_tree --guide-file
-//! FILE` it was 0.84 in dining-room, 0.29 in veach-bidir, 0.25 in kitchen, 0.21 in veach-mis, 0.19 in veach-ajar (all by
-//! Bitterli, version 3) and 0.14 in the torus of `scenes/make_torus.py`; 0.07 in cornell-box, 0.06 in staircase, 0.01 under
+//! FILE` it was 0.81 in dining-room, 0.28 in veach-bidir, 0.24 in kitchen, 0.23 in veach-mis, 0.20 in veach-ajar (all by
+//! Bitterli, version 3) and 0.13 in the torus of `scenes/make_torus.py`; 0.06 in cornell-box, 0.05 in staircase, 0.01 under
 //! the sky of `tests/guiding/open.xml`, 0.00 in living-room-2 and classroom, -0.01 in `scenes/bathroom.xml`. What guiding is
 //! worth beside the roulette it comes with is another question, which this only helps to answer: of the first, veach-ajar was
 //! seen to gain in five seconds, dining-room, kitchen and the torus were not.

@@ -19,8 +19,8 @@ const PRIOR: f64 = 8.0;
 /// No pixel is taken for darker than this part of the picture's mean.
 const DARKEST: f64 = 0.02;
 
-/// The part that the picture as a whole has in the goal of a pixel. By its own estimate alone a dark pixel would get as
-/// much work as a bright one, though what is wrong there shows less; and bright ones, where few paths decide, too little.
+/// The part that the picture as a whole has in the goal of a pixel: 0 would spend work by the relative error of each pixel,
+/// 1 by its error as such.
 const WHOLE: f64 = 1.0 / 3.0;
 
 /// Samples per pixel from which the variance of the picture is believed.
@@ -121,8 +121,8 @@ impl Estimates {
         }
         image.iter_mut().for_each(|image| *image = image.max(DARKEST * mean));
         // Of logarithms, so that a lamp in view does not decide.
-        let whole = (image.iter().map(|image| image.ln()).sum::<f64>() / image.len() as f64).exp();
-        image.iter_mut().for_each(|image| *image = image.powf(1.0 - WHOLE) * whole.powf(WHOLE));
+        let whole = image.iter().map(|image| image.ln()).sum::<f64>() / image.len() as f64;
+        image.iter_mut().for_each(|image| *image = ((1.0 - WHOLE) * image.ln() + WHOLE * whole).exp());
         let effort = (cost / self.relative_variance(&image)).sqrt() as f32;
         let effort = if effort.is_finite() { effort } else { 0.0 };
         self.goals = image.iter().map(|image| Goal { image: *image as f32, effort }).collect();
