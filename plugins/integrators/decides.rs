@@ -13,7 +13,7 @@ pub(super) trait Decides {
     fn branches(&self, path: &PathState, albedo: Rgb, outlook: Option<Outlook>) -> f32;
 
     /// See [`Roulette::survival`].
-    fn survival(&self, path: &PathState, delta: bool) -> f32;
+    fn survival(&self, path: &PathState) -> f32;
 }
 
 /// As the reference.
@@ -26,8 +26,8 @@ impl Decides for ByThroughput {
     }
 
     #[inline(always)]
-    fn survival(&self, path: &PathState, delta: bool) -> f32 {
-        Roulette::survival(self, path, delta)
+    fn survival(&self, path: &PathState) -> f32 {
+        Roulette::survival(self, path)
     }
 }
 
@@ -40,7 +40,7 @@ impl Decides for &dyn Roulette {
     }
 
     #[inline]
-    fn survival(&self, path: &PathState, delta: bool) -> f32 {
-        Roulette::survival(*self, path, delta)
+    fn survival(&self, path: &PathState) -> f32 {
+        Roulette::survival(*self, path)
     }
 }

@@ -58,6 +58,7 @@ pub(super) fn trace<'v, D: Directions<Here: 'v>, R: Decides>(
     let mut ray = camera.ray;
     let mut throughput = Rgb::WHITE;
     let mut eta = 1.0;
+    let mut passage = 1.0;
     // Of the vertex before; none at the camera and after a delta lobe, where light sampling has no part.
     let mut last: Option<Scattered> = None;
     let mut depth = 0;
@@ -97,6 +98,9 @@ pub(super) fn trace<'v, D: Directions<Here: 'v>, R: Decides>(
                 _ => directions.here(&hit, bxdf, depth == 0),
             };
             let lobes = bsdf.lobes();
+            if R::BRANCHES && lobes.is_smooth() {
+                passage = 1.0;
+            }
             // Whether the sample is transparent does not depend on what roulette decides.
             let asked = depth > 0 && (found.alpha > 0.0 || !lobes.intersects(Lobes::NULL));
             if R::BRANCHES
@@ -110,7 +114,7 @@ pub(super) fn trace<'v, D: Directions<Here: 'v>, R: Decides>(
                 if asked {
                     found.alpha = 1.0;
                     let (prospects, goal) = (directions.prospects(throughput), directions.goal());
-                    let path = PathState { throughput, prospects, eta, due: depth >= rr_depth, depth, goal };
+                    let path = PathState { throughput, prospects, eta, passage, due: depth >= rr_depth, depth, goal };
                     wanted = limited(roulette.branches(&path, place.albedo, directions.outlook(&place)), splits);
                     count = wanted as u32 + u32::from(u_left < wanted.fract());
                     if count == 0 {
@@ -166,13 +170,17 @@ pub(super) fn trace<'v, D: Directions<Here: 'v>, R: Decides>(
             depth += 1;
             directions.note_step(here, &hit, bxdf, &step);
 
+            if R::BRANCHES && delta {
+                passage *= sample.weight.max_component() * sample.eta * sample.eta;
+            }
+
             if throughput.is_black() {
                 break 'path;
             }
             u_left = u_roulette;
             if depth >= rr_depth {
                 let (prospects, goal) = (directions.prospects(throughput), directions.goal());
-                let q = roulette.survival(&PathState { throughput, prospects, eta, due: true, depth, goal }, delta);
+                let q = roulette.survival(&PathState { throughput, prospects, eta, passage, due: true, depth, goal });
                 if u_roulette >= q {
                     break 'path;
                 }

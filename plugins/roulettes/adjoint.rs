@@ -4,12 +4,12 @@
 //! sections 7.7 and 10.6). Expected is the throughput times what scattering at a vertex has brought so far; the goal is
 //! what the samples before have found for the pixel. If their ratio is within a window about 1 the path goes on; below,
 //! it goes on with a probability that makes up for it, not less than 0.05; above, it splits, into 20 at most. This is
-//! decided before light is sampled at a vertex, not at the first one, nor at delta lobes, which go by the throughput
-//! from `rr_depth` on. What a guided `path` does without a roulette. Where nothing is known it is as `throughput`, but no
-//! probability is below 0.05.
+//! decided before light is sampled at a vertex, not at the first one, nor where there are delta lobes alone: from
+//! `rr_depth` on these go by what they have left of the light since the last vertex that has others. What a guided `path`
+//! does without a roulette. Where nothing is known it is as `throughput`, but no probability is below 0.05.
 //!
 //! Published are the pixel alone as the goal, and a window of 5. Here the goal is brought nearer to the mean of the picture,
-//! so that it is not the relative error of every pixel alone that counts, and the window is 7, so that fewer paths end and
+//! so that it is not the relative error of every pixel alone that counts, and the window is 8.5, so that fewer paths end and
 //! split. Which window suits a scene tells `lucerna compare scene.xml -m path+roulette=adjoint path+roulette=adjoint:window=5`.
 //!
 //! What scattering brings is learnt in a tree over space while the picture forms, in the tree of the guide `sd_tree` if
@@ -18,7 +18,7 @@
 //!
 //! | parameter | type | default | meaning |
 //! |---|---|---|---|
-//! | `window` | float | 7 | upper end of the window over the lower; 1 is the middle of both |
+//! | `window` | float | 8.5 | upper end of the window over the lower; 1 is the middle of both |
 //!
 //! Limits. It pays where light is bounced often or arrives from places that few paths see, as in a room that is lit
 //! through a door ajar, and the more, the more samples there are to learn from. In simple scenes under light that is
@@ -41,7 +41,7 @@ use lucerna_core::scene::{Built, Constructor, Param, Plugin, Properties};
 use std::sync::Arc;
 
 /// The window's default.
-const WINDOW: f64 = 7.0;
+const WINDOW: f64 = 8.5;
 
 /// Table entry.
 pub const PLUGIN: Plugin = Plugin {
@@ -84,7 +84,7 @@ impl Roulette for Adjoint {
         limited(path, if weight < low { weight / low } else { (weight / high).max(1.0) })
     }
 
-    fn survival(&self, path: &PathState, delta: bool) -> f32 {
-        survival_after_branches(path, delta)
+    fn survival(&self, path: &PathState) -> f32 {
+        survival_after_branches(path)
     }
 }

@@ -36,7 +36,7 @@ fn build(_p: &Properties<'_>) -> Built<dyn Roulette> {
 struct ByAlbedo;
 
 impl Roulette for ByAlbedo {
-    fn survival(&self, path: &PathState, _delta: bool) -> f32 {
+    fn survival(&self, path: &PathState) -> f32 {
         survival(path.prospects, path.eta)
     }
 }

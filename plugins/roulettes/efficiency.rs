@@ -58,7 +58,7 @@ impl Roulette for Efficiency {
         limited(path, if ends < 1.0 { ends } else { splits.max(1.0) })
     }
 
-    fn survival(&self, path: &PathState, delta: bool) -> f32 {
-        survival_after_branches(path, delta)
+    fn survival(&self, path: &PathState) -> f32 {
+        survival_after_branches(path)
     }
 }

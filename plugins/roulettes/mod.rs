@@ -34,10 +34,11 @@ fn unlearnt(path: &PathState) -> f32 {
     if path.due { survival(path.prospects, path.eta).max(LEAST_SURVIVAL) } else { 1.0 }
 }
 
-/// The survival of a path of which the number of branches has been decided already: delta lobes go by [`survival`], the
-/// others go on.
-fn survival_after_branches(path: &PathState, delta: bool) -> f32 {
-    if delta { survival(path.prospects, path.eta) } else { 1.0 }
+/// The survival of a path whose branches are decided elsewhere: delta lobes go by what they alone have left of the light.
+/// The throughput has no say, for behind a guide it is the lower, the more light is thought to be ahead: judged by it, paths
+/// that a guide sends to a lamp through glass would end at the glass, and the few that are left count many times.
+fn survival_after_branches(path: &PathState) -> f32 {
+    limited(path, path.passage.clamp(LEAST_SURVIVAL, 1.0))
 }
 
 /// An answer from what has been learnt, limited after many vertices.

@@ -36,7 +36,7 @@ pub(crate) struct ByThroughput;
 
 impl Roulette for ByThroughput {
     #[inline]
-    fn survival(&self, path: &PathState, _delta: bool) -> f32 {
+    fn survival(&self, path: &PathState) -> f32 {
         survival(path.throughput, path.eta)
     }
 }

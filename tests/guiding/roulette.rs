@@ -76,8 +76,8 @@ impl Roulette for Counted {
         answer
     }
 
-    fn survival(&self, path: &PathState, delta: bool) -> f32 {
-        self.inner.survival(path, delta)
+    fn survival(&self, path: &PathState) -> f32 {
+        self.inner.survival(path)
     }
 }
 
@@ -146,7 +146,8 @@ fn hc_p14_extremes_never_kill_a_path_for_good() {
                     {
                         let throughput = Rgb::splat(throughput);
                         let goal = Goal { image, effort: 2.0 };
-                        let path = PathState { throughput, prospects: throughput, eta: 1.0, due, depth: 9, goal };
+                        let (prospects, eta, passage) = (throughput, 1.0, 1.0);
+                        let path = PathState { throughput, prospects, eta, passage, due, depth: 9, goal };
                         for outlook in [None, Some(Outlook { light, square, spread: square, cost })] {
                             let count = continuations(roulette.branches(&path, Rgb::splat(0.5), outlook));
                             assert!((0.05..=20.0).contains(&count), "{name}: {path:?}, {outlook:?}: {count}");
@@ -163,6 +164,25 @@ fn hc_p14_extremes_never_kill_a_path_for_good() {
         }
     }
     measured("hc_p14_extremes_never_kill_a_path_for_good", format!("{asked} answers in [0.05, 20]"));
+}
+
+/// A guide lowers the throughput where it sends paths to a lamp through glass: they must not end at the glass. Where
+/// delta lobes swallow light paths end, and also where they never do.
+#[test]
+fn paths_that_are_guided_through_glass_go_on() {
+    let dim = Rgb::splat(1e-4);
+    let state = |passage, depth| {
+        let goal = Goal { image: 1.0, effort: 2.0 };
+        PathState { throughput: dim, prospects: dim, eta: 1.0, passage, due: true, depth, goal }
+    };
+    for name in LEARNT {
+        let roulette = roulette(name, &[]);
+        for (passage, depth, expected) in
+            [(1.0, 9, 1.0), (2.0, 9, 1.0), (0.25, 9, 0.25), (1e-9, 9, 0.05), (1.0, 1000, 0.95), (0.25, 1000, 0.25)]
+        {
+            assert_eq!(roulette.survival(&state(passage, depth)), expected, "{name}: {passage} after {depth}");
+        }
+    }
 }
 
 /// A rule that in effect does nothing would be unbiased, too.

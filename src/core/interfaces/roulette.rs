@@ -24,6 +24,9 @@ pub struct PathState {
     pub prospects: Rgb,
     /// Product of the indices of refraction along the path.
     pub eta: f32,
+    /// What delta lobes have left of the light since the last vertex that has other lobes too: their weights' largest
+    /// channels, with the compression of radiance in dense media taken out.
+    pub passage: f32,
     /// The depth from which the integrator lets paths end has been reached.
     pub due: bool,
     /// Vertices behind this one.
@@ -70,9 +73,8 @@ pub trait Roulette: Send + Sync {
         1.0
     }
 
-    /// The probability with which a path whose direction is chosen goes on, greater than zero. `delta` says whether the
-    /// direction is that of a delta lobe.
-    fn survival(&self, path: &PathState, delta: bool) -> f32;
+    /// The probability with which a path whose direction is chosen goes on, greater than zero.
+    fn survival(&self, path: &PathState) -> f32;
 }
 
 /// An answer of [`Roulette::branches`] as it is followed: what is not a number counts as 1, and no path is lost for

@@ -153,6 +153,8 @@ struct Lesson<'r, 'a> {
 
 impl Lesson<'_, '_> {
     fn iterations(&mut self) {
+        // Whether the latest one was guided.
+        let mut guided = true;
         loop {
             let index = self.at.course.index;
             // A run that goes on is inside an iteration.
@@ -160,13 +162,16 @@ impl Lesson<'_, '_> {
                 Some(part) => part,
                 None => {
                     let Some(part) = self.part() else { return };
-                    // The first ones share a picture, for one sample has no variance.
-                    if index == 0 || !part.startup {
+                    // The first ones share a picture, for one sample has no variance; and so do all that are left to the
+                    // BSDF, which differ in nothing: parts of a sequence of numbers are not as even as the whole.
+                    let alike = !guided && !self.at.learner.field().guides();
+                    if index == 0 || !(part.startup || alike) {
                         self.at.pictures.begin();
                     }
                     part
                 }
             };
+            guided = self.at.learner.field().guides();
             self.at.course.part = Some(part);
             let (seconds, spp) = (self.cx.control.seconds(), self.at.report.spp);
             let complete = self.iteration(part);
