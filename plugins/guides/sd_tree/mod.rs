@@ -32,8 +32,8 @@
 //! | `file` | string | unset | a file to begin with, if it is there, and to leave what was learnt in; a relative name is looked for beside the scene. Only `render` writes it, and its `--guide-file` takes the place of both this and `frozen` |
 //! | `frozen` | boolean | false | nothing is learnt, and the file, which must be there, stays as it is |
 //!
-//! Where light is found rarely but from few directions, as that of a small lamp through glass, `prior` hides what was
-//! found, and a tenth of the budget is too little to learn from.
+//! Where light is found rarely but from few directions, as that of a small lamp through glass, `prior` may hide what was
+//! found, and a tenth of the budget may be too little to learn from.
 //! `lucerna compare scene.xml -m path path+guide=sd_tree path+guide=sd_tree:prior=0,learning=0.333` tells that, and what
 //! each sample costs.
 //!
