@@ -2,6 +2,7 @@
 //! they find.
 
 use super::directions::{Directions, Step, Unguided};
+use super::with_environment::WithEnvironment;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{
     Arena, Bxdf, BxdfSample, Goal, GuideSets, GuidedDirections, GuidedVertex, Lobes, MOST_GUIDED, Outlook, RecordKind,
@@ -41,6 +42,17 @@ pub(super) struct Learnt<'v> {
     follows_product: bool,
 }
 
+impl<'a> Guided<'a> {
+    /// What is known at a vertex at `p`, with the part that goes to the environment.
+    #[inline]
+    fn with_environment(&self, learnt: &'a dyn GuidedDirections, p: Vec3) -> &'a dyn GuidedDirections {
+        match self.guidance.environment {
+            Some((environment, part)) => self.arena.alloc(WithEnvironment { learnt, environment, part, p }),
+            None => learnt,
+        }
+    }
+}
+
 impl<'a> Directions for Guided<'a> {
     type Here = Learnt<'a>;
 
@@ -55,7 +67,7 @@ impl<'a> Directions for Guided<'a> {
         let vertex = GuidedVertex { one_sided: lobes.is_one_sided(), primary };
         let guide = self.guidance.field.at(hit, vertex, self.arena).and_then(|guide| {
             let p = guide.p_guide().clamp(0.0, MOST_GUIDED);
-            (p > 0.0).then_some((guide, p))
+            (p > 0.0).then_some((self.with_environment(guide, hit.p), p))
         });
         let follows_product = primary && self.guidance.sets == GuideSets::PrimaryProduct;
         Learnt { guide, teaches: true, hybrid, primary, follows_product }

@@ -13,6 +13,7 @@ mod path;
 mod path_kernel;
 mod volpath;
 mod volpathmis;
+mod with_environment;
 
 use lucerna_core::scene::Plugin;
 

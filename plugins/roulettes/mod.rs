@@ -10,7 +10,7 @@ mod throughput;
 
 pub(crate) use adjoint::by_default;
 use lucerna_core::color::Rgb;
-use lucerna_core::interfaces::{LEAST_SURVIVAL, PathState};
+use lucerna_core::interfaces::{LEAST_SURVIVAL, PathState, continuations};
 use lucerna_core::scene::Plugin;
 pub(crate) use throughput::ByThroughput;
 
@@ -38,7 +38,7 @@ fn unlearnt(path: &PathState) -> f32 {
 /// The throughput has no say, for behind a guide it is the lower, the more light is thought to be ahead: judged by it, paths
 /// that a guide sends to a lamp through glass would end at the glass, and the few that are left count many times.
 fn survival_after_branches(path: &PathState) -> f32 {
-    limited(path, path.passage.clamp(LEAST_SURVIVAL, 1.0))
+    limited(path, continuations(path.passage).min(1.0))
 }
 
 /// An answer from what has been learnt, limited after many vertices.

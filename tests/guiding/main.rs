@@ -45,11 +45,15 @@ fn sd_tree(spatial_threshold: u32, least_gain: u32, more: &str) -> String {
     )
 }
 
-/// Four small scenes with what a guide may do wrong: light from below and through a gap, glass and mirrors, BSDFs of smooth
-/// and delta lobes, transmission, light from everywhere and from a point.
-const SCENES: [(&str, &str); 4] = [
+/// Sun and sky with a pane before them.
+const PANE: &str = include_str!("pane.xml");
+
+/// Five small scenes with what a guide may do wrong: light from below and through a gap, glass and mirrors, BSDFs of smooth
+/// and delta lobes, transmission, light from everywhere and from a point, a sun behind glass.
+const SCENES: [(&str, &str); 5] = [
     ("gap", include_str!("gap.xml")),
     ("glass", include_str!("glass.xml")),
     ("sky", include_str!("sky.xml")),
     ("leaves", include_str!("leaves.xml")),
+    ("pane", PANE),
 ];

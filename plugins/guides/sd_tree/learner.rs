@@ -7,6 +7,8 @@
 //! | records until a cell is halved, times √samples | 12000, with filters 4000 | 500: pictures here have fewer pixels |
 //! | what a cell knows | its own records of the last iteration | those together with [what larger cells know](super::prior), and half of what was found before |
 //! | part of the flux until directions are divided, depth | 0.01, 20 | the same; but not where few records have nearly all of it |
+//! | what a record counts | what it found | as much as all others in its cell together, at most: one that met a sun by chance would hide for many iterations what was found before and after |
+//! | where a bright environment is hidden by glass | found by chance | a part of the directions [goes there](lucerna_core::interfaces::Training::to_environment) |
 //! | upper levels of quadtrees | as the flux asks | always three, as a table that the cosine can weight |
 //! | filter of directions | cut off at the edges | goes round in the azimuth, is moved inside at the poles |
 //! | probability of the guide | any | from 0.05 to 0.7 if learnt, at most 0.95 if given |
@@ -14,7 +16,7 @@
 //! | gradient of that probability | as large as the radiance | over its mean, or the regularisation would depend on it |
 //! | descent: rate, decays, regularisation | 0.01, 0.9 and 0.999, 0.01 | the same |
 //! | light that emitter sampling finds | not learnt, or by its weight | by its weight |
-//! | weights of iterations | inverse mean variance of themselves | of the other half of the pixels |
+//! | weights of iterations | inverse mean variance of themselves | of the other half of the pixels, and no sample counts more than a later one |
 //! | roulette | none, or by the light ahead | by the light ahead, learnt for each side of surfaces in a cell |
 //! | iterations at the start, then | 8 of 1 sample, then 1, 2, 4, … | 8 of 1 sample, then as many as all before: 8, 16, 32, … |
 //! | the last iteration | as long as two would be, guided by an eighth of all samples | begins once a tenth of the budget is spent, since samples that are learnt from take longer |
@@ -167,6 +169,13 @@ impl Learner {
         sorted
     }
 
+    /// Mean flux of the records that the cells know of.
+    fn usual(&self) -> f64 {
+        let (flux, count) =
+            self.cells.iter().fold((0.0, 0.0), |(flux, count), cell| (flux + cell.sums.total(), count + cell.count));
+        if count > 0.0 { flux / count } else { 0.0 }
+    }
+
     /// What is gained over the BSDF, in nats, if that is known.
     pub(super) fn gain(&self) -> Option<f64> {
         gain::mean(self.cells.iter().map(|cell| &cell.gain))
@@ -268,13 +277,16 @@ impl GuideLearner for Learner {
         if !self.apart.is_empty() {
             return self.learn_apart(tiles, &parts);
         }
+        let usual = self.usual();
         let filled = filled(&mut self.cells, &parts);
         let (filter, learns_mixing) = (self.settings.directional_filter, self.settings.p_guide.is_none());
         let learns_gain = self.settings.may_leave();
         filled.into_par_iter().for_each(|(cell, parts)| {
-            for part in parts {
-                let record = &tiles[part.tile as usize][part.record as usize];
-                cell.take(record, f64::from(part.share), filter);
+            let records =
+                || parts.iter().map(|part| (&tiles[part.tile as usize][part.record as usize], f64::from(part.share)));
+            let all = cell.sums.total() + records().map(|(record, share)| share * flux(record)).sum::<f64>();
+            for (record, share) in records() {
+                cell.take(record, share, Most { all, usual }, filter);
                 if learns_mixing {
                     cell.mixing.step(record);
                 }
@@ -298,8 +310,7 @@ impl GuideLearner for Learner {
     }
 
     fn refine(&mut self, spp: u32) {
-        let judged = self.settings.may_leave() && self.iterations + 1 >= self.settings.trial;
-        let too_little = judged && self.gain().is_some_and(|gain| gain < self.settings.least_gain);
+        let too_little = self.gain().is_some_and(|gain| gain < self.settings.asked_gain(self.iterations + 1));
         let guides = self.field.guides && !too_little;
         let p_guide = self.settings.p_guide;
         let total: f64 = self.cells.iter().map(|cell| cell.sums.total()).sum();
@@ -375,15 +386,41 @@ impl GuideLearner for Learner {
 impl Cell {
     /// Takes a part of a record in.
     #[inline]
-    pub(super) fn take(&mut self, record: &GuideRecord, share: f64, filter: DirectionalFilter) {
+    pub(super) fn take(&mut self, record: &GuideRecord, share: f64, most: Most, filter: DirectionalFilter) {
         self.count += share;
-        put(&mut self.sums, record, share * f64::from(record.radiance) / f64::from(record.pdf), filter);
+        put(&mut self.sums, record, most.of(share * flux(record)), filter);
     }
 
     /// The part of its sums that each half has, after it was halved.
     pub(super) fn left(&self) -> f64 {
         (-f64::from(self.halved)).exp2()
     }
+}
+
+/// What a record in a cell may count.
+#[derive(Clone, Copy)]
+pub(super) struct Most {
+    /// The flux of all records of the cell, those included that are about to be taken in.
+    pub all: f64,
+    /// The mean flux of a record in all cells.
+    pub usual: f64,
+}
+
+impl Most {
+    /// No limit.
+    pub const NONE: Most = Most { all: f64::INFINITY, usual: 0.0 };
+
+    /// What a record of this flux counts: as much as all others of its cell together, at most.
+    fn of(self, flux: f64) -> f64 {
+        let most = (self.all - flux).max(self.usual);
+        if most > 0.0 { flux.min(most) } else { flux }
+    }
+}
+
+/// A record's estimate of the flux, its radiance over its density; 0 if it is none.
+fn flux(record: &GuideRecord) -> f64 {
+    let flux = f64::from(record.radiance) / f64::from(record.pdf);
+    if flux.is_finite() && record.kind != RecordKind::Delta { flux.max(0.0) } else { 0.0 }
 }
 
 /// Adds flux from a record's direction, if it is any. What a delta lobe found is none: its direction has a probability, and

@@ -12,7 +12,7 @@
 
 use super::Settings;
 use super::field::Leaf;
-use super::learner::{Cell, Learner, Part, filled, put};
+use super::learner::{Cell, Learner, Most, Part, filled, put};
 use super::mixing::{LIMITS, Mixing};
 use super::prior;
 use super::quadtree::Quadtree;
@@ -100,7 +100,7 @@ impl Apart {
     fn take_light(&mut self, cell: &mut Cell, origin: f32, (record, share): (&GuideRecord, f64), settings: &Settings) {
         let filter = settings.directional_filter;
         let GuideRecord { radiance, direct, pdf_sets: [first, second], .. } = *record;
-        cell.take(&GuideRecord { radiance: (radiance - direct).max(0.0), ..*record }, share, filter);
+        cell.take(&GuideRecord { radiance: (radiance - direct).max(0.0), ..*record }, share, Most::NONE, filter);
         put(&mut self.sums, record, share * f64::from(direct) / f64::from(record.pdf), filter);
         let p_guide = settings.p_guide.unwrap_or_else(|| cell.mixing.p_guide());
         if settings.p_guide.is_none() {
@@ -136,7 +136,7 @@ impl Learner {
                 } else if record.primary {
                     apart.take_product(record, share, settings);
                 } else {
-                    cell.take(record, share, settings.directional_filter);
+                    cell.take(record, share, Most::NONE, settings.directional_filter);
                     if settings.p_guide.is_none() {
                         cell.mixing.step(record);
                     }

@@ -72,6 +72,9 @@ pub struct Training {
     pub learn_direct: bool,
     /// Narrower lobes than this are not guided.
     pub least_roughness: f32,
+    /// The part of a guide's directions that go where the environment is bright, in scenes where emitter sampling cannot see
+    /// all that a ray sees of it.
+    pub to_environment: f32,
     /// Directions that are tried at a vertex before one of them is chosen by the product of the BSDF and the light
     /// learnt.
     pub candidates: u32,

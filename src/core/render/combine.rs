@@ -5,7 +5,8 @@
 //! weights of that text's equation 6 are sums of inverse variances; what its words ask for, and what is done here, is the
 //! inverse of the mean variance. Weights that come from the samples they weigh favour dark pictures, for what raises the
 //! mean raises the variance: therefore the pixels are divided like a chessboard, and each half has the weights that come
-//! from the other.
+//! from the other. And no sample counts for more than one of a later iteration: where the noise is in rare bright samples,
+//! a short early iteration has met none and seems to have the least.
 
 use super::FilmStore;
 use crate::interfaces::{Combination, Radiance};
@@ -173,6 +174,11 @@ impl Iterations {
                     && sampled.last().is_some_and(|i| i.spp < ENOUGH)
                 {
                     *last = *before;
+                }
+                for i in (1..variances.len()).rev() {
+                    if let [Some(earlier), Some(later)] = &mut variances[i - 1..=i] {
+                        *earlier = [0, 1].map(|half: usize| earlier[half].max(later[half]));
+                    }
                 }
                 let weigh = |(i, v): (&&Iteration, Option<[f64; 2]>)| {
                     v.map(|[even, odd]| [f64::from(i.spp) / odd, f64::from(i.spp) / even])

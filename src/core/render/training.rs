@@ -17,7 +17,8 @@ use super::standing::{Course, Part, Standing};
 use super::tiles::{Run, Tracer, asked_spp, points};
 use super::{Budget, Learnt, RenderContext, RenderError, Report, SampleOrder};
 use crate::interfaces::{
-    Arena, CameraRay, EmitterSampling, Ending, Goal, Guide, GuideField, GuideSets, Radiance, Subjects, Training,
+    Arena, CameraRay, Emitter, EmitterSampling, Ending, Goal, Guide, GuideField, GuideSets, Radiance, Subjects,
+    Training,
 };
 use crate::io::output::check_replaceable;
 use crate::sampling::Stream;
@@ -52,6 +53,8 @@ pub struct Guidance<'a> {
     pub sets: GuideSets,
     /// What is known of the pixel.
     pub goal: Goal,
+    /// What surrounds the scene, if a part of the guide's directions is to go where it is bright, and that part.
+    pub environment: Option<(&'a dyn Emitter, f32)>,
     /// Narrower lobes than this are not guided.
     pub least_roughness: f32,
     /// Directions that are tried at a vertex; while nothing has been learnt it makes no difference.
@@ -111,8 +114,23 @@ pub fn render_guided(
     let (training, earlier) = (guide.training(), at.report.seconds);
     let frozen = file.as_ref().is_some_and(|file| file.frozen);
     let (keeps, pace, snapshot) = (left_in.is_some(), 0.0, None);
-    let mut lesson =
-        Lesson { cx, run, estimator, training, subjects, keeper, at, asked, frozen, keeps, earlier, pace, snapshot };
+    let environment = hidden_environment(cx.scene, training.to_environment);
+    let mut lesson = Lesson {
+        cx,
+        run,
+        estimator,
+        training,
+        subjects,
+        environment,
+        keeper,
+        at,
+        asked,
+        frozen,
+        keeps,
+        earlier,
+        pace,
+        snapshot,
+    };
     lesson.iterations();
     let Lesson { run, at, .. } = lesson;
     let Standing { course, mut report, pictures, learner, .. } = at;
@@ -128,6 +146,12 @@ pub fn render_guided(
     Ok((report, learner.field()))
 }
 
+/// What surrounds the scene, for this part of the guide's directions, if a ray can see more of it than emitter sampling.
+fn hidden_environment(scene: &Scene, part: f32) -> Option<(&dyn Emitter, f32)> {
+    let environment = scene.environment().filter(|_| part > 0.0 && scene.has_windows())?;
+    Some((scene.emitter(environment), part))
+}
+
 /// A run under way.
 struct Lesson<'r, 'a> {
     cx: &'r RenderContext<'a>,
@@ -135,6 +159,7 @@ struct Lesson<'r, 'a> {
     estimator: &'r dyn GuidedEstimator,
     training: Training,
     subjects: Subjects,
+    environment: Option<(&'a dyn Emitter, f32)>,
     keeper: Option<Keeper<'a>>,
     at: Standing,
     /// Samples per pixel of the whole run.
@@ -295,6 +320,7 @@ impl Lesson<'_, '_> {
             EmitterSampling::Always => true,
         };
         let Training { learn_direct, least_roughness, candidates, .. } = self.training;
+        let environment = self.environment;
         let field = self.at.learner.field();
         let directions = self.subjects.directions && field.guides();
         let subjects = Subjects { directions, ..self.subjects };
@@ -304,8 +330,17 @@ impl Lesson<'_, '_> {
         }
         let learner = &mut self.at.learner;
         let (sets, goal) = (field.sets(), Goal::default());
-        let guidance =
-            Guidance { field: &*field, sample_emitters, learning, subjects, sets, goal, least_roughness, candidates };
+        let guidance = Guidance {
+            field: &*field,
+            sample_emitters,
+            learning,
+            subjects,
+            sets,
+            goal,
+            environment,
+            least_roughness,
+            candidates,
+        };
         let guided = Guided { estimator: self.estimator, guidance, learn_direct, estimates: &self.at.estimates };
         // Notes are taken in as they come, so that those of a few tiles at most are held. A pass that is lost
         // afterwards has taught something nevertheless.

@@ -2,7 +2,7 @@
 
 use super::object::{BuiltSensor, BuiltShape};
 use crate::accel::{Accel, BuildOptions, Geometry, Hit, NO_INSTANCE, NO_TRIANGLE, Ray};
-use crate::interfaces::{Bsdf, Emitter, EmitterFlags, Integrator, Light, LightPoint, LightSample, SurfaceHit};
+use crate::interfaces::{Bsdf, Emitter, EmitterFlags, Integrator, Light, LightPoint, LightSample, Lobes, SurfaceHit};
 use crate::math::{ONE_MINUS_EPSILON, Transform, Vec2, Vec3};
 use crate::sampling::Discrete;
 use std::sync::Arc;
@@ -263,6 +263,15 @@ impl Scene {
     #[inline]
     pub fn environment(&self) -> Option<EmitterId> {
         self.environment
+    }
+
+    /// Whether there are surfaces through which a ray sees lights that emitter sampling cannot.
+    pub fn has_windows(&self) -> bool {
+        let is_window = |shape: &BuiltShape| shape.bsdf.lobes().intersects(Lobes::NULL | Lobes::DELTA_TRANSMISSION);
+        self.shapes.iter().any(|shape| match shape.shape.instance() {
+            Some(instance) => instance.group().shapes.iter().any(is_window),
+            None => is_window(shape),
+        })
     }
 
     /// All shapes.
