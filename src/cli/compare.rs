@@ -31,7 +31,8 @@ Methods: `path`, `direct`, `path:max_depth=4`, `path:sampler=sobol`, `path+guide
     define = { power = \"2\" }            # the scene's $power
     # renderer = \"mitsuba:scalar_rgb\"
 
-What a method does not name stays as the scene has it; a sampler of the scene that the reference renderer does not have is
+What a method does not name stays as the scene has it, but an integrator that is named comes without the scene's guide,
+roulette, light sampler and cache. A sampler of the scene that the reference renderer does not have is
 replaced by `independent` for it. The first method is the baseline, unless a file or --baseline says
 otherwise. Runs are kept in the report's folder: the same command again continues where it was.
 

@@ -1,4 +1,5 @@
-//! A method: a name and what it changes in a scene. Whatever it does not name stays as the scene has it.
+//! A method: a name and what it changes in a scene. Whatever it does not name stays as the scene has it, but an integrator
+//! that is named comes without the guide and other decisions of the scene's own.
 
 use crate::short_form::{decide, parse, plain_value};
 use lucerna_core::scene::{Description, Location, Node, ObjectKind, Parameter, Registry, Value};
@@ -224,7 +225,8 @@ impl Method {
     }
 
     /// Changes a scene. The integrator's parameters that the scene gives stay, if the method does not give them and they
-    /// have a meaning for its integrator; the number of samples per pixel belongs to the comparison.
+    /// have a meaning for its integrator, but not its guide or other decisions: `path` is not guided, whatever the scene says.
+    /// The number of samples per pixel belongs to the comparison.
     ///
     /// # Errors
     /// If the scene has no integrator that makes a decision of the method; one line.
@@ -258,7 +260,11 @@ fn replace(description: &mut Description, parent: lucerna_core::scene::NodeId, w
         let same = before.plugin == wanted.plugin;
         let stays = |p: &&Parameter| {
             let has_meaning = same || known.is_some_and(|plugin| plugin.param(&p.name).is_some());
-            has_meaning && node.parameter(&p.name).is_none() && (same || !matches!(p.value, Value::Object(_)))
+            let fits = match p.value {
+                Value::Object(id) => same && !DECISIONS.contains(&description.node(id).kind),
+                _ => true,
+            };
+            has_meaning && node.parameter(&p.name).is_none() && fits
         };
         let kept: Vec<Parameter> = before.parameters.iter().filter(stays).cloned().collect();
         node.parameters.extend(kept);
@@ -271,12 +277,14 @@ fn replace(description: &mut Description, parent: lucerna_core::scene::NodeId, w
     parameters.push(Parameter { name, value: Value::Object(id), at });
 }
 
+/// What an integrator may leave to other plugins.
+const DECISIONS: [ObjectKind; 4] =
+    [ObjectKind::Guide, ObjectKind::LightSampler, ObjectKind::Roulette, ObjectKind::Cache];
+
 /// A decision in short form: `guide=sd_tree:startup=4`.
 fn decision(text: &str, part: &str) -> Result<Node, String> {
-    const KINDS: [ObjectKind; 4] =
-        [ObjectKind::Guide, ObjectKind::LightSampler, ObjectKind::Roulette, ObjectKind::Cache];
     let (tag, plugin) = part.split_once('=').unwrap_or((part, ""));
-    let kind = KINDS.into_iter().find(|kind| kind.tag() == tag);
+    let kind = DECISIONS.into_iter().find(|kind| kind.tag() == tag);
     let kind = kind.ok_or_else(|| format!("--methods {text}: \"{tag}\" is no decision, such as guide"))?;
     parse(kind, plugin, "--methods")
 }
@@ -352,6 +360,26 @@ mod tests {
         let texts = ["path".to_owned(), "path".to_owned()];
         assert_eq!(Methods::parse(&texts).unwrap_err(), "two methods are called \"path\"");
         assert!(Methods::parse(&[]).is_err());
+    }
+
+    /// A scene for `guided_path` compared with `path` would be compared with itself.
+    #[test]
+    fn an_integrator_that_is_named_comes_without_the_decisions_of_the_scene() {
+        let xml = r#"<scene version="3.0.0"><integrator type="path"><integer name="max_depth" value="6"/>
+            <guide type="sd_tree"/><roulette type="albedo"/></integrator></scene>"#;
+        for (text, expected) in [
+            ("path", vec![]),
+            ("path+roulette=adjoint", vec!["adjoint"]),
+            ("path+guide=sd_tree", vec!["sd_tree"]),
+            ("scene", vec!["sd_tree", "albedo"]),
+        ] {
+            let mut scene = lucerna_core::scene::xml::load_str(xml, "t.xml", &Default::default()).unwrap();
+            Method::of_text(text).unwrap().apply(&mut scene, &crate::builtin()).unwrap();
+            let (_, integrator) = scene.children(scene.root).next().unwrap();
+            let found: Vec<&str> = scene.children(integrator).map(|(_, id)| scene.node(id).plugin.as_str()).collect();
+            assert_eq!(found, expected, "{text}");
+            assert!(scene.node(integrator).parameter("max_depth").is_some(), "{text}");
+        }
     }
 
     #[test]

@@ -34,7 +34,7 @@
 //! | `frozen` | boolean | false | nothing is learnt, and the file, which must be there, stays as it is |
 //!
 //! Where light is found rarely but from few directions, as that of a small lamp through glass, `prior` may hide what was
-//! found, and a tenth of the budget may be too little to learn from.
+//! found, and a fifth of the budget may be too little to learn from.
 //! `lucerna compare scene.xml -m path path+guide=sd_tree path+guide=sd_tree:prior=0,learning=0.333` tells that, and what
 //! each sample costs.
 //!
@@ -51,8 +51,8 @@
 //! sampled lights or from caustics that are rarely found, gain little, and each sample costs more: least where rays are
 //! dear, as in large scenes, and most in a box of few triangles. Each candidate of `resampling` asks the guide and the
 //! BSDF again; it pays where rays are dear and BSDFs are not diffuse. `prior` 0, `memory` 0, `spatial_threshold` 12000,
-//! both filters `nearest`, `p_guide` 0.5, `product` `none`, `startup` 0 and `combination` `last` are nearly the form of
-//! 2017.
+//! both filters `nearest`, `p_guide` 0.5, `product` `none`, `startup` 0, `environment` 0 and `combination` `last` are nearly
+//! the form of 2017.
 //!
 //! Samples are never clamped, guided or not. A limit to what a sample may count would take more light where the guide knows
 //! little than where it knows much, and leave patches along the edges of its cells, most of all in shadows. More samples,
