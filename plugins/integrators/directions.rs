@@ -11,8 +11,9 @@ pub(super) trait Directions {
     /// What is known at a vertex: read once, then used for all that happens there.
     type Here: Copy;
 
-    /// Reads it. `primary` says whether this is the first vertex of a path from the camera.
-    fn here(&self, hit: &SurfaceHit, bxdf: &dyn Bxdf, primary: bool) -> Self::Here;
+    /// Reads it. `primary` says whether this is the first vertex of a path from the camera; `undecided`, that the lobe which is
+    /// drawn here decides whether the sample is transparent, so that the BSDF has to choose.
+    fn here(&self, hit: &SurfaceHit, bxdf: &dyn Bxdf, primary: bool, undecided: bool) -> Self::Here;
 
     /// Whether lights are sampled that a ray can also run into.
     #[inline(always)]
@@ -132,7 +133,7 @@ impl Directions for Unguided {
     type Here = ();
 
     #[inline(always)]
-    fn here(&self, _hit: &SurfaceHit, _bxdf: &dyn Bxdf, _primary: bool) {}
+    fn here(&self, _hit: &SurfaceHit, _bxdf: &dyn Bxdf, _primary: bool, _undecided: bool) {}
 
     #[inline(always)]
     fn mixed_pdf((): (), _d: Vec3, pdf_bsdf: f32) -> f32 {

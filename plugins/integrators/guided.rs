@@ -34,8 +34,6 @@ pub(super) struct Learnt<'v> {
     guide: Option<(&'v dyn GuidedDirections, f32)>,
     /// Something can be learnt here.
     teaches: bool,
-    /// The BSDF also has delta lobes.
-    hybrid: bool,
     /// The first vertex of a path from the camera.
     primary: bool,
     /// What the guide knows here follows the product with the BSDF already.
@@ -57,20 +55,20 @@ impl<'a> Directions for Guided<'a> {
     type Here = Learnt<'a>;
 
     #[inline]
-    fn here(&self, hit: &SurfaceHit, bxdf: &dyn Bxdf, primary: bool) -> Learnt<'a> {
+    fn here(&self, hit: &SurfaceHit, bxdf: &dyn Bxdf, primary: bool, undecided: bool) -> Learnt<'a> {
         let lobes = bxdf.lobes();
-        let hybrid = lobes.has_delta();
         let directs = self.guidance.subjects.directions;
         if !directs || !is_guided(bxdf, lobes, self.guidance.least_roughness) {
-            return Learnt { guide: None, teaches: false, hybrid, primary, follows_product: false };
+            return Learnt { guide: None, teaches: false, primary, follows_product: false };
         }
         let vertex = GuidedVertex { one_sided: lobes.is_one_sided(), primary };
-        let guide = self.guidance.field.at(hit, vertex, self.arena).and_then(|guide| {
+        let known = if undecided { None } else { self.guidance.field.at(hit, vertex, self.arena) };
+        let guide = known.and_then(|guide| {
             let p = guide.p_guide().clamp(0.0, MOST_GUIDED);
             (p > 0.0).then_some((self.with_environment(guide, hit.p), p))
         });
         let follows_product = primary && self.guidance.sets == GuideSets::PrimaryProduct;
-        Learnt { guide, teaches: true, hybrid, primary, follows_product }
+        Learnt { guide, teaches: true, primary, follows_product }
     }
 
     #[inline]
@@ -237,7 +235,7 @@ impl<'a> Directions for Guided<'a> {
         let kind = match (here.teaches, step.sample.lobe.has_delta(), here.guide) {
             (false, ..) => None,
             // A pure passage belongs to what lies behind; a mirror teaches how often it is taken.
-            (true, true, Some(_)) if here.hybrid => Some(RecordKind::Delta),
+            (true, true, Some(_)) => Some(RecordKind::Delta),
             (true, true, _) => None,
             (true, false, Some(_)) => Some(RecordKind::Mixed),
             (true, false, None) => Some(RecordKind::Unguided),
@@ -280,4 +278,52 @@ impl<'a> Directions for Guided<'a> {
 /// Each channel, or this if it is less; also if it is no number.
 fn at_least(color: Rgb, least: f32) -> Rgb {
     Rgb::new(color.r.max(least), color.g.max(least), color.b.max(least))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::with_environment::tests::Above;
+    use super::*;
+    use crate::testing::Draft;
+    use lucerna_core::math::Frame;
+    use lucerna_core::sampling::Pcg32;
+    use lucerna_core::scene::{Object, ObjectKind};
+    use lucerna_core::stats::chi2::{SphereGrid, sidak};
+
+    /// Mixtures of a guide that looks upwards with BSDFs of smooth lobes, narrow ones, transmission, and delta lobes, on a
+    /// slope: half of what the guide gives lies below.
+    #[test]
+    fn hc_p01_mixtures_have_the_density_of_their_samples() {
+        let names = ["diffuse", "roughconductor", "roughdielectric", "roughplastic", "plastic"];
+        let (mut pcg, grid) = (Pcg32::new(7, 7), SphereGrid { rings: 16, spokes: 32 });
+        let frame = Frame::from_normal(Vec3::new(0.8, 0.0, 0.6));
+        let hit = SurfaceHit { n: frame.n, frame, wi: Vec3::new(0.6, 0.0, 0.8), ..SurfaceHit::default() };
+        for name in names {
+            let draft = Draft::new(ObjectKind::Bsdf, name);
+            let draft = if name.starts_with("rough") { draft.float("alpha", 0.3) } else { draft };
+            let Ok(Object::Bsdf(bsdf)) = draft.build() else { panic!("{name} is no BSDF") };
+            let arena = Arena::new();
+            let bxdf = bsdf.resolve(&hit, &arena);
+            for p_guide in [0.1, 0.5, 0.9] {
+                let guide = Some((&Above as &dyn GuidedDirections, p_guide));
+                let here = Learnt { guide, teaches: true, primary: true, follows_product: false };
+                // Where the BSDF is black, a direction of the guide ends the path.
+                let density = |d: Vec3| {
+                    let (value, pdf_bsdf) = bxdf.eval_pdf(hit.wi, hit.to_local(d), Transport::Radiance);
+                    if value.is_black() { 0.0 } else { Guided::mixed_pdf(here, d, pdf_bsdf) }
+                };
+                let sample = || {
+                    let u2 = Vec2::new(pcg.next_f32(), pcg.next_f32());
+                    let step = Guided::sample(here, &hit, bxdf, pcg.next_f32(), u2)?;
+                    (!step.sample.lobe.has_delta()).then(|| {
+                        let told = density(step.d);
+                        assert!((step.sample.pdf / told - 1.0).abs() < 1e-2, "{name}: {} {told}", step.sample.pdf);
+                        step.d
+                    })
+                };
+                let found = grid.test(100_000, sample, density);
+                assert!(found.accepts(sidak(0.01, 3 * names.len())), "{name} {p_guide}: {found:?}");
+            }
+        }
+    }
 }

@@ -33,7 +33,7 @@ use crate::roulettes::ByThroughput;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{Arena, CameraRay, Guide, Integrator, Radiance, RadianceEstimator, Roulette, Subjects};
 use lucerna_core::render::{
-    Guidance, GuidedEstimator, Notebook, RenderContext, RenderError, Report, render_estimator, render_guided,
+    Guidance, GuidedEstimator, Notebook, RenderContext, RenderError, Report, films_of, render_estimator, render_guided,
 };
 use lucerna_core::sampling::Stream;
 use lucerna_core::scene::{Built, Constructor, ObjectKind, Param, Plugin, Properties, Scene};
@@ -94,6 +94,10 @@ impl Integrator for Path {
                 render_guided(cx, estimator, &**teacher, self.subjects).map(|(report, _)| report)
             }
         }
+    }
+
+    fn films(&self) -> u64 {
+        self.teacher.as_ref().map_or(1, |teacher| films_of(&teacher.training()))
     }
 
     fn timeout(&self) -> Option<f64> {

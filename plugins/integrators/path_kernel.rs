@@ -93,16 +93,17 @@ pub(super) fn trace<'v, D: Directions<Here: 'v>, R: Decides>(
             }
             let bsdf = scene.bsdf(&hit);
             let bxdf = bsdf.resolve(&hit, arena);
+            let lobes = bsdf.lobes();
+            // A sample is transparent if all lobes that were drawn let it through: how often must not depend on what decides.
+            let undecided = found.alpha == 0.0 && lobes.intersects(Lobes::NULL);
             let here = match resumed.take() {
                 Some(here) if R::BRANCHES => here,
-                _ => directions.here(&hit, bxdf, depth == 0),
+                _ => directions.here(&hit, bxdf, depth == 0, undecided),
             };
-            let lobes = bsdf.lobes();
             if R::BRANCHES && lobes.is_smooth() {
                 passage = 1.0;
             }
-            // Whether the sample is transparent does not depend on what roulette decides.
-            let asked = depth > 0 && (found.alpha > 0.0 || !lobes.intersects(Lobes::NULL));
+            let asked = depth > 0 && !undecided;
             if R::BRANCHES
                 && directions.looks_ahead()
                 && !resumes

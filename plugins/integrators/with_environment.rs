@@ -4,8 +4,8 @@
 //! see it, and a guide knows of it only where a path has met it by chance: one in a hundred thousand, each of which then counts
 //! as much as all others. But panes and thin glass hardly turn the light, and the environment knows where it is bright. So a
 //! part of the guide's directions is drawn as emitter sampling would draw them, without asking what is in the way; where
-//! something is learnt of that, the guide knows more from then on. (Vorba and others 2014 sampled the environment along with
-//! what they had learnt, too; there is no source for this rule here.)
+//! something is learnt of that, the guide knows more from then on. There is no published source for
+//! this rule.
 
 use lucerna_core::interfaces::{Emitter, GuidedDirections, LightPoint};
 use lucerna_core::math::{ONE_MINUS_EPSILON, Vec2, Vec3};
@@ -61,7 +61,7 @@ impl GuidedDirections for WithEnvironment<'_> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use lucerna_core::interfaces::{EmitterFlags, LightSample};
     use lucerna_core::math::Frame;
@@ -70,7 +70,7 @@ mod tests {
     use std::f32::consts::PI;
 
     /// Knows nothing but that light comes from above.
-    struct Above;
+    pub struct Above;
 
     impl GuidedDirections for Above {
         fn p_guide(&self) -> f32 {

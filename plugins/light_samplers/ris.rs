@@ -15,7 +15,8 @@
 //! only.
 //!
 //! Candidates of one vertex share their random numbers: the choices of lights are spread evenly over [0, 1), the places
-//! on lights follow a rotated lattice (Roberts 2018, "R2"). Each alone is uniform, which is all that the mean asks for.
+//! on lights follow a rotated lattice (Roberts 2018, "R2"). Any of them, chosen at
+//! random, is uniform, which is all that the mean asks for.
 //!
 //! | parameter | type | default | meaning |
 //! |---|---|---|---|

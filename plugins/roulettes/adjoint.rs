@@ -6,7 +6,7 @@
 //! it goes on with a probability that makes up for it, not less than 0.05; above, it splits, into 20 at most. This is
 //! decided before light is sampled at a vertex, not at the first one, nor where there are delta lobes alone: from
 //! `rr_depth` on these go by what they have left of the light since the last vertex that has others. What a guided `path`
-//! does without a roulette. Where nothing is known it is as `throughput`, but no probability is below 0.05.
+//! does without a roulette. Where nothing is known it is as `throughput`, and behind a guide as `albedo`, but no probability is below 0.05.
 //!
 //! Published are the pixel alone as the goal, and a window of 5. Here the goal is brought nearer to the mean of the picture,
 //! so that it is not the relative error of every pixel alone that counts, and the window is 8.5, so that fewer paths end and

@@ -10,7 +10,7 @@ use clap::Args;
 use lucerna_core::image::{self, exr, png};
 use lucerna_core::interfaces::{ComponentFormat, FileFormat, Integrator};
 use lucerna_core::math::UVec2;
-use lucerna_core::render::{Budget, Control, FilmStore, OnPass, PassEnd, RenderContext, Report, SampleOrder, replay};
+use lucerna_core::render::{Budget, Control, OnPass, PassEnd, RenderContext, Report, SampleOrder, replay};
 use lucerna_core::scene::{
     BuiltSensor, Description, NodeId, Object, ObjectKind, Parameter, Registry, Scene, Value, build_one,
 };
@@ -209,7 +209,7 @@ fn tell_size(size: UVec2, budget: Budget, target: Option<f64>, bytes: u64) {
     };
     let work = target.map_or(work.clone(), |target| format!("at most {work}, until the relMSE is about {target:e}"));
     let mib = bytes as f64 / f64::from(1 << 20);
-    eprintln!("{} x {} pixels, {work}; the sums of the picture take {mib:.1} MiB", size.x, size.y);
+    eprintln!("{} x {} pixels, {work}; the picture takes {mib:.1} MiB", size.x, size.y);
 }
 
 /// A scene may be read without a sensor or an integrator, but not rendered.
@@ -255,19 +255,15 @@ fn render(
     output: &Path,
 ) -> Result<ExitCode, Failure> {
     let window = window(arguments, camera)?;
-    let needed = FilmStore::bytes(window.1, integrator.aov_names().len()) >> 20;
+    let bytes = integrator.bytes(window.1);
+    let needed = bytes >> 20;
     if needed > arguments.max_memory {
         let name = arguments.scene.name();
         let message = format!("{name}: the picture needs {needed} MiB, the limit is {} MiB", arguments.max_memory);
         return Err(Failure::new(format!("{message} (raise it with --max-memory, or render a part with --crop)")));
     }
     if !arguments.quiet && arguments.pixel.is_none() {
-        tell_size(
-            window.1,
-            budget,
-            arguments.views.target_relmse,
-            FilmStore::bytes(window.1, integrator.aov_names().len()),
-        );
+        tell_size(window.1, budget, arguments.views.target_relmse, bytes);
         let flat = scene.accel().stats().degenerate;
         if flat > 0 {
             eprintln!("note: {flat} primitives have no area and are left out");

@@ -83,7 +83,8 @@ impl Subject {
             return Err("the scene has no integrator".to_owned());
         }
         let film = scene.sensors()[0].film.settings().crop_size;
-        let needed = FilmStore::bytes(film, scene.integrator().map_or(0, |i| i.aov_names().len())) >> 20;
+        let needed =
+            scene.integrator().map_or_else(|| FilmStore::bytes(film, 0), |integrator| integrator.bytes(film)) >> 20;
         if needed > MOST_MIB {
             return Err(format!(
                 "the picture needs {needed} MiB, the limit is {MOST_MIB} MiB (--size makes it smaller)"

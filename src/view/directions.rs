@@ -1,5 +1,6 @@
 //! What a guide has learnt at points of a scene, as a picture: for each point where it lies, the density of directions
-//! that come from the guide, and that of the mixture with the BSDF that paths are drawn from.
+//! that come from the guide, and that of the mixture with the BSDF that paths are drawn from; without the part that goes
+//! to the environment where glass or masks hide it.
 //!
 //! Directions are mapped to a rectangle by azimuth (to the right, 0 to 360° about z from x towards y) and the cosine
 //! with the z axis (upwards, −1 to 1), which keeps areas. Colours are densities over that of a uniform direction, 1/4π,
@@ -102,7 +103,7 @@ impl Learned<'_> {
         let arena = Arena::new();
         let bxdf = self.scene.bsdf(&hit).resolve(&hit, &arena);
         let lobes = bxdf.lobes();
-        let guided = is_guided(bxdf, lobes, self.least_roughness);
+        let guided = self.field.guides() && is_guided(bxdf, lobes, self.least_roughness);
         let vertex = GuidedVertex { one_sided: lobes.is_one_sided(), primary: true };
         let guide = self.field.at(&hit, vertex, &arena);
         let p_guide = guide.filter(|_| guided).map_or(0.0, |guide| guide.p_guide().clamp(0.0, MOST_GUIDED));

@@ -2,7 +2,7 @@
 
 use super::cone;
 use lucerna::core::interfaces::{
-    Arena, Guide, GuideLearner, GuideRecord, GuidedDirections, GuidedVertex, RecordKind, SurfaceHit,
+    Arena, FactValue, Guide, GuideLearner, GuideRecord, GuidedDirections, GuidedVertex, RecordKind, SurfaceHit,
 };
 use lucerna::core::math::{Aabb, Frame, Vec2, Vec3};
 use lucerna::core::sampling::Pcg32;
@@ -145,6 +145,43 @@ fn a_guide_that_gains_little_leaves_paths_to_the_bsdf() {
     assert!(!recalled("") && recalled("<float name='least_gain' value='0'/>"));
 }
 
+/// A tree that has filled its memory keeps to it, and is as good as that allows: all of space is divided, and what was found
+/// goes on to count.
+#[test]
+fn hc_p11_a_full_tree_is_evenly_coarse() {
+    let mut shown = Vec::new();
+    for more in ["", "<string name='sets' value='direct_indirect'/>", "<string name='sets' value='primary_product'/>"] {
+        let guide = guide(&format!(
+            "<float name='spatial_threshold' value='10'/><float name='max_memory' value='0.5'/>
+             <float name='directional_threshold' value='0.001'/>{more}"
+        ));
+        let (mut learner, mut pcg) = (guide.start(UNIT), Pcg32::new(5, 5));
+        for round in 0..6 {
+            let found = |_| {
+                let p = Vec3::new(pcg.next_f32(), pcg.next_f32(), pcg.next_f32());
+                light(p, &mut pcg)
+            };
+            learner.learn(&[(0..20_000).map(found).collect()]);
+            learner.refine(1);
+            let facts = learner.facts();
+            let fact = |name: &str| facts.iter().find(|fact| fact.name == name).map(|fact| &fact.value);
+            let Some(FactValue::Number(mib)) = fact("memory in MiB") else { panic!("no memory is told") };
+            let Some(FactValue::PerDepth(cells)) = fact("cells of space by depth") else { panic!("no cells are told") };
+            let depths: Vec<usize> = (0..cells.len()).filter(|depth| cells[*depth] > 0).collect();
+            assert!(*mib <= 0.5, "{more}, round {round}: {mib} MiB");
+            assert!(cells.iter().sum::<u64>() >= 16 && depths.len() <= 2, "{more}, round {round}: {cells:?}");
+            shown.push(*mib);
+        }
+        assert!(learner.summary().iter().any(|line| line.contains("limit of memory")), "{more}");
+        let saved = learner.save();
+        learner.refine(1);
+        assert!(learner.field().at(&hit(Vec3::splat(0.5), Vec3::Y), REFLECTS, &Arena::new()).is_some(), "{more}");
+        assert!(guide.recall(UNIT, &saved).is_ok(), "{more}");
+    }
+    let most = shown.into_iter().fold(0.0, f64::max);
+    measured("hc_p11_a_full_tree_is_evenly_coarse", format!("at most {most:.2} MiB of 0.5"));
+}
+
 #[test]
 fn hc_p01_trained_fields_have_the_density_of_their_samples() {
     const CELLS: usize = 100;
@@ -164,12 +201,14 @@ fn hc_p01_trained_fields_have_the_density_of_their_samples() {
         let mut learner = guide.start(UNIT);
         train(&mut *learner, 5, 50_000);
         let (field, mut pcg) = (learner.field(), Pcg32::new(9, 9));
+        let mut cells = 0;
         for number in 0..CELLS {
             let arena = Arena::new();
             let p = Vec3::new(pcg.next_f32(), pcg.next_f32(), pcg.next_f32());
             let normal = square_to_sphere(random(&mut pcg));
             let vertex = GuidedVertex { primary: number % 2 == 0, ..REFLECTS };
             let Some(directions) = field.at(&hit(p, normal), vertex, &arena) else { continue };
+            cells += 1;
             let expected = expected(directions);
             let integral: f64 = expected.iter().sum();
             worst = worst.max((integral - 1.0).abs());
@@ -184,6 +223,7 @@ fn hc_p01_trained_fields_have_the_density_of_their_samples() {
             let found = pearson(&observed, &expected);
             assert!(found.accepts(sidak(0.01, ways.len() * CELLS)), "{product}, {sets} at {p}: {found:?}");
         }
+        assert_eq!(cells, CELLS, "{product}, {sets}: some cells know nothing");
     }
     measured(
         "hc_p01_trained_fields_have_the_density_of_their_samples",

@@ -24,7 +24,7 @@ fn hc_x03_memory_is_told_before_the_start() {
     assert!(code == Some(2) && said.contains("the picture needs 10240 MiB"), "{said}");
     let (code, said) = program(&["render", "-D", "res=64", "--spp", "2", "-o", "told.exr"]);
     let first = said.lines().next().unwrap_or_default();
-    assert_eq!((code, first), (Some(0), "64 x 64 pixels, 2 samples each; the sums of the picture take 0.2 MiB"));
+    assert_eq!((code, first), (Some(0), "64 x 64 pixels, 2 samples each; the picture takes 0.2 MiB"));
     // Nothing between one pixel and 100 000 samples depends on their number.
     let (code, said) = program(&["render", "-D", "res=4", "--spp", "100000", "--pixel", "1,2", "--sample", "99999"]);
     assert_eq!(code, Some(0), "{said}");

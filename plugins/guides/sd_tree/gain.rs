@@ -7,13 +7,12 @@
 //! space by the light there, and then over all cells by their records, so that dark places count as bright ones.
 //!
 //! `lucerna guide info` tells it. After `lucerna render SCENE --size 96x54 --sampler sobol --spp 16 --guide sd_tree --guide-file
-//! FILE` it was 0.81 in dining-room, 0.28 in veach-bidir, 0.24 in kitchen, 0.23 in veach-mis, 0.20 in veach-ajar (all by
-//! Bitterli, version 3) and 0.13 in the torus of `scenes/make_torus.py`; 0.06 in cornell-box, 0.05 in staircase, 0.01 under
-//! the sky of `tests/guiding/open.xml`, 0.00 in living-room-2 and classroom, -0.01 in `scenes/bathroom.xml`. What guiding is
-//! worth beside the roulette it comes with is another question, which this only helps to answer: of the first, veach-ajar was
-//! seen to gain in five seconds and the torus in thirty, dining-room was not. (These figures are from before a record
-//! was limited to what all others in its cell count; with that limit the torus has 0.12 to 0.37 after eight samples, by the
-//! seed.)
+//! FILE` it was 0.81 in dining-room, 0.34 in kitchen, 0.29 in veach-bidir, 0.25 in veach-mis, 0.20 in veach-ajar (all by
+//! Bitterli, version 3), 0.30 in kitchen.xml as published with `guided_path` (`--lenient --integrator path`) and 0.20 in the torus
+//! of `scenes/make_torus.py`; 0.08 in cornell-box, 0.07 in staircase, 0.01 under the sky of `tests/guiding/open.xml`, 0.00 in
+//! living-room-2 and classroom, -0.01 in `scenes/bathroom.xml`. What guiding is worth beside the roulette it comes with is
+//! another question, which this only helps to answer: of the first, kitchen and veach-ajar were seen to gain in seconds and the
+//! torus in thirty, dining-room was not.
 
 use lucerna_core::interfaces::{GuideRecord, RecordKind};
 use lucerna_core::io::limits::Cursor;

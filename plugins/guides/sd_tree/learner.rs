@@ -7,7 +7,7 @@
 //! | records until a cell is halved, times √samples | 12000, with filters 4000 | 500: pictures here have fewer pixels |
 //! | what a cell knows | its own records of the last iteration | those together with [what larger cells know](super::prior), and half of what was found before |
 //! | part of the flux until directions are divided, depth | 0.01, 20 | the same; but not where few records have nearly all of it |
-//! | what a record counts | what it found | as much as all others in its cell together, at most: one that met a sun by chance would hide for many iterations what was found before and after |
+//! | what a record counts | what it found | as much as all others in its cell together, at most: one that met a sun by chance would hide for many iterations what was found before and after (not with two `sets`) |
 //! | where a bright environment is hidden by glass | found by chance | a part of the directions [goes there](lucerna_core::interfaces::Training::to_environment) |
 //! | upper levels of quadtrees | as the flux asks | always three, as a table that the cosine can weight |
 //! | filter of directions | cut off at the edges | goes round in the azimuth, is moved inside at the poles |
@@ -19,7 +19,7 @@
 //! | weights of iterations | inverse mean variance of themselves | of the other half of the pixels, and no sample counts more than a later one |
 //! | roulette | none, or by the light ahead | by the light ahead, learnt for each side of surfaces in a cell |
 //! | iterations at the start, then | 8 of 1 sample, then 1, 2, 4, … | 8 of 1 sample, then as many as all before: 8, 16, 32, … |
-//! | the last iteration | as long as two would be, guided by an eighth of all samples | begins once a fifth of the budget is spent, since samples that are learnt from take longer |
+//! | the last iteration | as long as two would be, guided by an eighth of all samples | begins once an iteration more would have learning go beyond a fifth of the budget, since samples that are learnt from take longer |
 
 use super::cylinder;
 use super::field::{Field, Leaf};
@@ -29,7 +29,7 @@ use super::outlook::{SIDES, Totals, side};
 use super::prior;
 use super::quadtree::Quadtree;
 use super::sets::Apart;
-use super::spatial::SpatialTree;
+use super::spatial::{self, SpatialTree};
 use super::sums::{Refinement, Sums};
 use super::{DirectionalFilter, Settings, SpatialFilter};
 use lucerna_core::interfaces::{
@@ -136,7 +136,7 @@ impl Learner {
     fn parts<T: Sync>(&self, tiles: &[Vec<T>], place: impl Fn(&T, u64, &mut dyn FnMut(u32, f32)) + Sync) -> Vec<Part> {
         let numbered = tiles.iter().scan(self.taken, |next, tile| {
             let first = *next;
-            *next += tile.len() as u64;
+            *next = next.wrapping_add(tile.len() as u64);
             Some(first)
         });
         let firsts: Vec<u64> = numbered.collect();
@@ -146,7 +146,7 @@ impl Learner {
             .map(|(tile, records)| {
                 let mut parts = Vec::with_capacity(records.len());
                 for (index, record) in records.iter().enumerate() {
-                    let (tile, number) = (tile as u32, firsts[tile] + index as u64);
+                    let (tile, number) = (tile as u32, firsts[tile].wrapping_add(index as u64));
                     let record_index = index as u32;
                     place(record, number, &mut |cell, share| {
                         parts.push(Part { cell, tile, record: record_index, share })
@@ -183,29 +183,31 @@ impl Learner {
 
     /// Bytes of everything.
     pub(super) fn bytes(&self) -> usize {
-        // Where nothing is kept apart, there is a second one to sample from.
+        let cells = self.cells.iter().map(|cell| self.bytes_of(cell)).sum::<usize>();
+        2 * self.tree.bytes() + cells + self.apart.iter().map(Apart::bytes).sum::<usize>()
+    }
+
+    /// Bytes of a cell, with its leaf.
+    fn bytes_of(&self, cell: &Cell) -> usize {
+        // Where nothing is kept apart, there is a second tree of directions to sample from.
         let copies = if self.apart.is_empty() { 2 } else { 1 };
-        let tree = |cell: &Cell| copies * cell.directions.as_ref().map_or(0, |tree| tree.bytes());
-        let cells =
-            self.cells.iter().map(|cell| size_of::<Cell>() + size_of::<Leaf>() + cell.sums.bytes() + tree(cell));
-        2 * self.tree.bytes() + cells.sum::<usize>() + self.apart.iter().map(Apart::bytes).sum::<usize>()
+        let trees = copies * cell.directions.as_ref().map_or(0, |tree| tree.bytes());
+        size_of::<Cell>() + size_of::<Leaf>() + cell.sums.bytes() + trees
     }
 
     /// Divides cells of space which got many records. Both halves go on with what is known in the whole.
     fn split(&mut self, spp: u32) {
-        let most = self.settings.spatial_threshold * f64::from(spp).sqrt();
-        let mut left = self.settings.max_bytes.saturating_sub(self.bytes());
-        let mut full = false;
+        let left = self.settings.max_bytes.saturating_sub(self.bytes());
+        let mut most = self.settings.spatial_threshold * f64::from(spp).sqrt();
+        // Where it cannot be as fine as asked for it is coarser everywhere, not in what happens to come last.
+        while self.bytes_of_halves(most) > left {
+            most *= 2.0;
+            self.full = true;
+        }
         let cells = std::cell::RefCell::new((&mut self.cells, &mut self.apart));
         let wanted = |leaf: u32, _| {
             let (cells, apart) = &*cells.borrow();
-            let (cell, apart) = (&cells[leaf as usize], apart.get(leaf as usize));
-            let needed = size_of::<Cell>() + size_of::<Leaf>() + cell.sums.bytes() + 2 * size_of::<[u32; 2]>();
-            let needed = needed + apart.map_or(0, |apart| size_of::<Apart>() + apart.sums.bytes());
-            let divide = cell.count + apart.map_or(0.0, |apart| apart.count) > most;
-            full |= divide && needed > left;
-            left = if divide { left.saturating_sub(needed) } else { left };
-            divide && left > 0
+            records(&cells[leaf as usize], apart.get(leaf as usize)) > most
         };
         self.tree.split(wanted, |old, _| {
             let (cells, apart) = &mut *cells.borrow_mut();
@@ -219,7 +221,17 @@ impl Learner {
             let half = cells[old as usize].clone();
             cells.push(half);
         });
-        self.full |= full;
+    }
+
+    /// Bytes that cells take which come from halving those with more records than this, until they have no more.
+    fn bytes_of_halves(&self, most: f64) -> usize {
+        let bytes = |(index, cell): (usize, &Cell)| {
+            let apart = self.apart.get(index);
+            let halvings = (records(cell, apart) / most).log2().ceil().clamp(0.0, f64::from(spatial::DEEPEST));
+            let each = self.bytes_of(cell) + apart.map_or(0, Apart::bytes) + 2 * size_of::<[u32; 2]>();
+            each.saturating_mul((1_usize << halvings as u32) - 1)
+        };
+        self.cells.iter().enumerate().map(bytes).fold(0, usize::saturating_add)
     }
 
     /// Leaves a part of the sums; their trees follow the flux that was found.
@@ -232,27 +244,26 @@ impl Learner {
         };
         let old: Vec<Sums> = self.cells.iter_mut().map(|cell| std::mem::take(&mut cell.sums)).collect();
         let old_apart: Vec<Sums> = self.apart.iter_mut().map(|apart| std::mem::take(&mut apart.sums)).collect();
-        let fits = (0..MOST_COARSENINGS).any(|_| {
+        for coarsening in 1..=MOST_COARSENINGS {
             self.cells.par_iter_mut().zip(&old).for_each(|(cell, old)| {
                 let kept = how.kept * cell.left();
                 cell.sums = old.refined(Refinement { kept, ..how });
             });
             self.refine_apart(&old_apart, how);
-            let fits = self.bytes() <= self.settings.max_bytes;
-            self.full |= !fits;
-            how.threshold *= 2.0;
-            fits
-        });
-        for cell in &mut self.cells {
-            cell.halved = 0;
-            if !fits {
-                cell.sums = Sums::default();
+            if self.bytes() <= self.settings.max_bytes {
+                break;
             }
+            self.full = true;
+            // In the end, no cell of directions is divided at all.
+            how.threshold = if coarsening + 1 < MOST_COARSENINGS { 2.0 * how.threshold } else { f64::INFINITY };
         }
-        if !fits {
-            self.apart.iter_mut().for_each(|apart| apart.sums = Sums::default());
-        }
+        self.cells.iter_mut().for_each(|cell| cell.halved = 0);
     }
+}
+
+/// Records of a cell, with those that are kept apart.
+fn records(cell: &Cell, apart: Option<&Apart>) -> f64 {
+    cell.count + apart.map_or(0.0, |apart| apart.count)
 }
 
 /// Each cell that has parts, with them.
@@ -273,7 +284,7 @@ pub(super) fn filled<'a, T>(cells: &'a mut [T], parts: &'a [Part]) -> Vec<(&'a m
 impl GuideLearner for Learner {
     fn learn(&mut self, tiles: &[Vec<GuideRecord>]) {
         let parts = self.parts(tiles, |record, number, put| self.place(record, number, put));
-        self.taken += tiles.iter().map(|tile| tile.len() as u64).sum::<u64>();
+        self.taken = tiles.iter().fold(self.taken, |taken, tile| taken.wrapping_add(tile.len() as u64));
         if !self.apart.is_empty() {
             return self.learn_apart(tiles, &parts);
         }
@@ -310,7 +321,8 @@ impl GuideLearner for Learner {
     }
 
     fn refine(&mut self, spp: u32) {
-        let too_little = self.gain().is_some_and(|gain| gain < self.settings.asked_gain(self.iterations + 1));
+        let too_little =
+            self.gain().is_some_and(|gain| gain < self.settings.asked_gain(self.iterations.saturating_add(1)));
         let guides = self.field.guides && !too_little;
         let p_guide = self.settings.p_guide;
         let total: f64 = self.cells.iter().map(|cell| cell.sums.total()).sum();
@@ -344,7 +356,7 @@ impl GuideLearner for Learner {
         let mut field = Field::new(self.tree.clone(), leaves, cosine, sets, self.apart_leaves());
         field.guides = guides;
         self.field = Arc::new(field);
-        self.iterations += 1;
+        self.iterations = self.iterations.saturating_add(1);
     }
 
     fn field(&self) -> Arc<dyn GuideField> {

@@ -139,7 +139,7 @@ impl Mixing {
         if self.steps == 0 {
             (self.decay_1, self.decay_2) = (1.0, 1.0);
         }
-        self.steps += 1;
+        self.steps = self.steps.saturating_add(1);
         self.decay_1 *= BETA_1;
         self.decay_2 *= BETA_2;
         self.m = BETA_1 * self.m + (1.0 - BETA_1) * gradient;

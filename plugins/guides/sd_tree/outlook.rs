@@ -109,7 +109,13 @@ pub fn unpack(from: &mut Cursor<'_>) -> Result<([Totals; SIDES], [Option<Outlook
     }
     for (_, known) in known.iter_mut().enumerate().filter(|(side, _)| bits >> (SIDES + side) & 1 == 1) {
         let mut next = || from.f32(WHAT);
-        *known = Some(Outlook { light: next()?, square: next()?, cost: next()?, spread: next()? });
+        let outlook = Outlook { light: next()?, square: next()?, cost: next()?, spread: next()? };
+        let Outlook { light, square, cost, spread } = outlook;
+        // Squares of light may be more than a number holds.
+        if [light, cost].iter().any(|mean| !(0.0..=f32::MAX).contains(mean)) || !(square >= 0.0 && spread >= 0.0) {
+            return Err(IoError::new("a cell has an outlook that is none"));
+        }
+        *known = Some(outlook);
     }
     Ok((totals, known))
 }

@@ -287,7 +287,7 @@ mod tests {
     fn split_at(tree: &mut SpatialTree, p: Vec3, depth: u32) {
         while tree.leaf(tree.cell(p)).1 < depth {
             let (leaf, _) = tree.leaf(tree.cell(p));
-            tree.split(|l, d| l == leaf && d < depth && d + 1 > 0 && d == d.min(depth), |_, _| ());
+            tree.split(|l, d| l == leaf && d < depth, |_, _| ());
         }
     }
 

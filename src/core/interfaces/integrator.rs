@@ -2,7 +2,8 @@
 
 use super::{Arena, CameraRay};
 use crate::color::Rgb;
-use crate::render::{RenderContext, RenderError, Report};
+use crate::math::UVec2;
+use crate::render::{FilmStore, RenderContext, RenderError, Report};
 use crate::sampling::Stream;
 use crate::scene::Scene;
 
@@ -14,6 +15,16 @@ pub trait Integrator: Send + Sync {
     /// Names of the channels after colour and alpha, in order. Empty for most.
     fn aov_names(&self) -> Vec<String> {
         Vec::new()
+    }
+
+    /// How many films' memory a run takes, at most: more than one where pictures are combined.
+    fn films(&self) -> u64 {
+        1
+    }
+
+    /// Bytes that a picture of this size takes while it is rendered.
+    fn bytes(&self, size: UVec2) -> u64 {
+        FilmStore::bytes(size, self.aov_names().len()) * self.films()
     }
 
     /// Seconds after which the scene wants rendering to stop.

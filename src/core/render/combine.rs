@@ -163,8 +163,9 @@ impl Iterations {
         let by_count = || sampled.iter().map(|i| [f64::from(i.spp); 2]).collect::<Vec<_>>();
         let mut weights = match self.policy {
             Combination::All | Combination::Last => {
-                let last = sampled.iter().rposition(|i| i.spp > 0);
-                (0..sampled.len()).map(|i| [f64::from(u8::from(Some(i) == last)); 2]).collect()
+                // The last that is complete, until the one under way has as many samples.
+                let best = (0..sampled.len()).max_by_key(|i| sampled[*i].spp);
+                (0..sampled.len()).map(|i| [f64::from(u8::from(Some(i) == best)); 2]).collect()
             }
             Combination::InverseVariance => {
                 let mut variances: Vec<Option<[f64; 2]>> = sampled.iter().map(|i| i.variances()).collect();
@@ -303,6 +304,20 @@ mod tests {
         );
         assert!(bias.abs() < 4.0 * sigma, "{bias} against {sigma}");
         assert!(gain > 1.3, "{gain}");
+    }
+
+    /// A run that ends early, in an iteration that has hardly begun, shows the last that is complete.
+    #[test]
+    fn the_last_complete_iteration_counts_until_there_is_a_better_one() {
+        for (spp, shown) in [(4, 64.0), (100, 100.0)] {
+            let mut all = iterations(Combination::Last, &[(16, 1.0), (64, 1.0)], 1, None);
+            all.begin();
+            let film = all.film();
+            all.extend(film, spp, &[]);
+            let weights = all.weights();
+            let counts: Vec<f64> = all.kept.iter().zip(weights).map(|(i, [w, _])| w * f64::from(i.spp)).collect();
+            assert_eq!(counts.iter().sum::<f64>(), shown, "{counts:?}");
+        }
     }
 
     #[test]

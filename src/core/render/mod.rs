@@ -27,7 +27,7 @@ pub use learnt::Learnt;
 pub use notebook::{Notebook, Place, Scattering};
 pub use reference_order::ReferenceOrder;
 pub use tiles::{render_estimator, replay};
-pub use training::{Guidance, GuidedEstimator, render_guided};
+pub use training::{Guidance, GuidedEstimator, films_of, render_guided};
 
 use crate::image::Image;
 use crate::interfaces::{FilmSettings, Sampler, Sensor};

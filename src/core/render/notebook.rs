@@ -84,12 +84,15 @@ pub struct Notebook {
     vertices: Vec<VertexRecord>,
     learn_direct: bool,
     subjects: Subjects,
+    /// Records of either kind that are kept; what comes after is not learnt.
+    most: usize,
 }
 
 impl Notebook {
-    /// An empty one. `learn_direct` says whether light counts that emitter sampling finds too.
-    pub fn new(learn_direct: bool, subjects: Subjects) -> Self {
-        Notebook { learn_direct, subjects, ..Notebook::default() }
+    /// An empty one. `learn_direct` says whether light counts that emitter sampling finds too, `most` how many records of
+    /// either kind it holds.
+    pub fn new(learn_direct: bool, subjects: Subjects, most: usize) -> Self {
+        Notebook { learn_direct, subjects, most, ..Notebook::default() }
     }
 
     /// The records of all paths, in their order.
@@ -151,7 +154,7 @@ impl Notebook {
             let light = scattered.luminance() / albedo.luminance();
             fork.sum += scattered * fork.share;
             fork.left = fork.left.saturating_sub(1);
-            if light.is_finite() && light >= 0.0 {
+            if light.is_finite() && light >= 0.0 && self.vertices.len() < self.most {
                 let [count, sum, squares] = &mut fork.ended;
                 (*count, *sum, *squares) = (*count + 1.0, *sum + light, *squares + light * light);
                 let variance = (*squares - *sum * *sum / *count).max(0.0) / (*count - 1.0);
@@ -173,6 +176,7 @@ impl Notebook {
         let arriving = (met + beyond) * boost;
         if let Some(kind) = at.kind
             && self.subjects.directions
+            && self.records.len() < self.most
         {
             let learnt = if self.learn_direct { arriving } else { (met_alone + beyond) * boost };
             let direct = (if self.learn_direct { met } else { met_alone } * boost).mean();
@@ -227,7 +231,7 @@ mod tests {
         for (learn_direct, expected) in
             [(true, [5.0, 9.0, 1.0 + 0.5 * 9.0 + 2.0]), (false, [0.0, 8.0, 1.0 + 0.5 * 9.0])]
         {
-            let mut book = Notebook::new(learn_direct, DIRECTIONS);
+            let mut book = Notebook::new(learn_direct, DIRECTIONS, usize::MAX);
             book.direct(Rgb::splat(7.0));
             book.scattered(vertex(3.0));
             book.met(Rgb::splat(2.0), false);
@@ -247,7 +251,7 @@ mod tests {
     #[test]
     fn hc_p05_a_path_of_a_thousand_vertices_is_noted_to_its_end() {
         const VERTICES: usize = 1000;
-        let mut book = Notebook::new(true, DIRECTIONS);
+        let mut book = Notebook::new(true, DIRECTIONS, usize::MAX);
         for round in 1..=2 {
             for _ in 0..VERTICES {
                 book.direct(Rgb::splat(1.0));
@@ -274,7 +278,7 @@ mod tests {
 
     #[test]
     fn light_that_only_scattering_finds_is_always_learnt() {
-        let mut book = Notebook::new(false, DIRECTIONS);
+        let mut book = Notebook::new(false, DIRECTIONS, usize::MAX);
         book.scattered(vertex(1.0));
         book.met(Rgb::splat(2.0), true);
         book.end(0);
@@ -284,7 +288,7 @@ mod tests {
     /// One path does not leave anything to the next.
     #[test]
     fn paths_are_apart() {
-        let mut book = Notebook::new(true, DIRECTIONS);
+        let mut book = Notebook::new(true, DIRECTIONS, usize::MAX);
         book.scattered(vertex(1.0));
         book.direct(Rgb::splat(3.0));
         book.end(0);
@@ -299,7 +303,7 @@ mod tests {
     fn branches_count_their_share() {
         const OUTLOOK: Subjects = Subjects { directions: true, outlook: true };
         let place = Place { p: Vec3::ZERO, n: Vec3::Z, albedo: Rgb::splat(0.5) };
-        let mut book = Notebook::new(true, OUTLOOK);
+        let mut book = Notebook::new(true, OUTLOOK, usize::MAX);
         book.forked(place, 1, 1.0, 1);
         book.direct(Rgb::splat(1.0));
         book.scattered(vertex(0.5));

@@ -2,7 +2,8 @@
 //!
 //! Rendering is cut into iterations. In each, paths are guided by what the iterations before have taught, and note what
 //! they find; what a field gives does not change meanwhile. So every picture is unbiased, and has the same bits for any
-//! number of threads. First come some iterations of one sample per pixel, by which the field learns where paths go at
+//! number of threads. (Unbiased for certain where samples are independent. Those of a sequence that fills a pixel evenly lie
+//! where the earlier ones do not, which a field depends on as far as it was taught by that pixel; no error of this kind was seen.) First come some iterations of one sample per pixel, by which the field learns where paths go at
 //! all; then each has as many as all before it together. Once a part of the budget is spent ([`Training::learning`]; or
 //! learning more no longer pays: [`Ending`]), the last one takes all that is left, and notes nothing, unless what is learnt
 //! is kept (after Müller, Gross, Novák 2017, section 5, and Müller 2019, sections 10.2 and 10.7, where iterations begin to
@@ -17,8 +18,8 @@ use super::standing::{Course, Part, Standing};
 use super::tiles::{Run, Tracer, asked_spp, points};
 use super::{Budget, Learnt, RenderContext, RenderError, Report, SampleOrder};
 use crate::interfaces::{
-    Arena, CameraRay, Emitter, EmitterSampling, Ending, Goal, Guide, GuideField, GuideSets, Radiance, Subjects,
-    Training,
+    Arena, CameraRay, Combination, Emitter, EmitterSampling, Ending, Goal, Guide, GuideField, GuideSets, Radiance,
+    Subjects, Training,
 };
 use crate::io::output::check_replaceable;
 use crate::sampling::Stream;
@@ -28,6 +29,9 @@ use std::sync::Arc;
 
 /// Tiles whose notes are held at the same time, at one sample per pixel: about 40 MiB.
 const NOTED: usize = 512;
+
+/// Records of either kind that these hold at most. Paths may split without end almost; so many would take 2 GiB.
+const MOST_RECORDS: usize = 1 << 24;
 
 /// Samples per pixel of a pass at most, as in [`super::Schedule`].
 const LONGEST_PASS: u32 = 16;
@@ -146,6 +150,15 @@ pub fn render_guided(
     Ok((report, learner.field()))
 }
 
+/// How many films' memory a run takes, at most: those of the iterations that count, of the one under way, of its pass and of the
+/// whole, with the moments of each and what is known of the pixels.
+pub fn films_of(training: &Training) -> u64 {
+    match training.combination {
+        Combination::InverseVariance => 14,
+        Combination::All | Combination::Last => 9,
+    }
+}
+
 /// What surrounds the scene, for this part of the guide's directions, if a ray can see more of it than emitter sampling.
 fn hidden_environment(scene: &Scene, part: f32) -> Option<(&dyn Emitter, f32)> {
     let environment = scene.environment().filter(|_| part > 0.0 && scene.has_windows())?;
@@ -213,9 +226,13 @@ impl Lesson<'_, '_> {
             if !complete {
                 return;
             }
-            let pace = (self.cx.control.seconds() - seconds) / f64::from(now.max(1));
+            // A run that goes on where an iteration had all its samples takes none.
+            let pace = match now {
+                0 => self.at.course.pace,
+                _ => (self.cx.control.seconds() - seconds) / f64::from(now),
+            };
             self.at.course = Course { index: index + 1, part: None, pace, ..self.at.course };
-            if !part.startup {
+            if !part.startup && now > 0 {
                 self.expect(pace);
             }
         }
@@ -341,10 +358,11 @@ impl Lesson<'_, '_> {
             least_roughness,
             candidates,
         };
-        let guided = Guided { estimator: self.estimator, guidance, learn_direct, estimates: &self.at.estimates };
         // Notes are taken in as they come, so that those of a few tiles at most are held. A pass that is lost
         // afterwards has taught something nevertheless.
         let batch = (NOTED / (end - start) as usize).max(1);
+        let (estimator, estimates, most_records) = (self.estimator, &self.at.estimates, MOST_RECORDS / batch);
+        let guided = Guided { estimator, guidance, learn_direct, most_records, estimates };
         let hand_over = |notes: Vec<TileNotes>| {
             let (records, found): (Vec<_>, Vec<_>) =
                 notes.into_iter().map(|TileNotes { book, moments }| (book.into_records(), moments)).unzip();
@@ -381,6 +399,8 @@ struct Guided<'a> {
     estimator: &'a dyn GuidedEstimator,
     guidance: Guidance<'a>,
     learn_direct: bool,
+    /// That a tile keeps.
+    most_records: usize,
     estimates: &'a Estimates,
 }
 
@@ -388,7 +408,10 @@ impl Tracer for Guided<'_> {
     type Notes = TileNotes;
 
     fn notes(&self) -> TileNotes {
-        TileNotes { book: Notebook::new(self.learn_direct, self.guidance.subjects), moments: Moments::default() }
+        TileNotes {
+            book: Notebook::new(self.learn_direct, self.guidance.subjects, self.most_records),
+            moments: Moments::default(),
+        }
     }
 
     fn wants_differentials(&self) -> bool {

@@ -83,8 +83,8 @@ pub(super) fn unwrap_integrator(editor: &mut Editor, node: NodeId) -> Option<Str
     editor.unwrap_child(node)
 }
 
-/// Reads the public plugin `guided_path` as `path` with the guide `sd_tree`, as that plugin is without its later
-/// extensions unless the scene asks for them.
+/// Reads the public plugin `guided_path` as `path` with the guide `sd_tree`: its parameters, and its defaults where the scene
+/// names none. What it has no parameter for (`prior`, `memory`, `environment`, roulette) is as anywhere else.
 pub(super) fn guided_path(editor: &mut Editor, node: NodeId) -> Option<String> {
     let guide = editor.add_beside(node, ObjectKind::Guide, "sd_tree");
     let mut word = |name, fallback: &str| match editor.take(node, name) {
@@ -104,6 +104,9 @@ pub(super) fn guided_path(editor: &mut Editor, node: NodeId) -> Option<String> {
     editor.set(guide, "spatial_filter", text(&spatial));
     editor.set(guide, "directional_filter", text(&directional));
     editor.set(guide, "combination", text(if combination == "inversevar" { "inverse_variance" } else { "last" }));
+    if combination == "automatic" {
+        editor.set(guide, "ending", text("variance"));
+    }
     if loss == "none" {
         editor.set(guide, "p_guide", Value::Float(1.0 - p_bsdf));
     } else {

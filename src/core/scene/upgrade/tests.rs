@@ -80,7 +80,7 @@ fn guided_path_with_all_its_parameters() {
              </integrator><sensor type='perspective'><sampler type='independent'/></sensor>",
             "<integrator type='path'><guide name='_guide' type='sd_tree'><string name='nee' value='never'/>\
              <string name='spatial_filter' value='nearest'/><string name='directional_filter' value='nearest'/>\
-             <string name='combination' value='last'/><float name='p_guide' value='0.5'/>\
+             <string name='combination' value='last'/><string name='ending' value='variance'/><float name='p_guide' value='0.5'/>\
              <float name='learning' value='0.333'/><float name='spatial_threshold' value='6000'/>\
              <float name='directional_threshold' value='0.01'/>\
              <boolean name='direct' value='false'/><integer name='startup' value='0'/><string name='product' value='none'/>\
