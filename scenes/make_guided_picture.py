@@ -25,7 +25,7 @@ def main():
     folder = ROOT / "target/torus"
     subprocess.run([sys.executable, ROOT / "scenes/make_torus.py", "-o", folder], check=True)
     pictures = []
-    for name, more in (("path", []), ("guided", ["--guide", "sd_tree:prior=0,learning=0.333", "--roulette", "albedo"])):
+    for name, more in (("path", []), ("guided", ["--guide", "sd_tree"])):
         to = folder / f"{name}.png"
         command = [arguments.lucerna, "render", folder / "torus.xml", "-Dresx=384", "-Dresy=288", "--sampler", "sobol"]
         subprocess.run([*command, "--seconds", str(arguments.seconds), "-o", to, *more], check=True)
