@@ -213,19 +213,18 @@ pub fn checkpoint(path: &Path, every: f64) -> Checkpoint {
 
 /// Each run is interrupted after these numbers of samples per pixel, at the end of a pass, or inside of the first pass that
 /// begins with as many: the picture, the numbers and what was learnt are those of a run without interruption.
-fn interruptions_leave_no_trace(test: &str, nested: &str, after: &[&[u32]], inside: &[u32]) {
-    const SPP: u32 = 64;
+fn interruptions_leave_no_trace(test: &str, spp: u32, nested: &str, after: &[&[u32]], inside: &[u32]) {
     let folder = folder(test);
     let both = |name: &str, every: f64| Kept {
         guide_file: Some(GuideFile { path: folder.join(format!("{name}.guide")), frozen: false }),
         checkpoint: Some(checkpoint(&folder.join(format!("{name}.state")), every)),
     };
     let alone = Kept { checkpoint: None, ..both("alone", 0.0) };
-    let (expected, bits) = render(nested, 1, SPP, 2, alone, &Control::new()).expect("it renders");
+    let (expected, bits) = render(nested, 1, spp, 2, alone, &Control::new()).expect("it renders");
     let learnt = fs::read(folder.join("alone.guide")).expect("a file");
     let compare = |name: &str, report: &Report, found: &[u32]| {
         assert!(found == bits, "{name}: another picture");
-        assert_eq!((report.spp, report.samples, report.rays), (SPP, expected.samples, expected.rays), "{name}");
+        assert_eq!((report.spp, report.samples, report.rays), (spp, expected.samples, expected.rays), "{name}");
         assert_eq!(report.notes, expected.notes, "{name}");
         assert!(fs::read(folder.join(format!("{name}.guide"))).expect("a file") == learnt, "{name}: learnt otherwise");
     };
@@ -237,17 +236,17 @@ fn interruptions_leave_no_trace(test: &str, nested: &str, after: &[&[u32]], insi
                 false => ControlFlow::Continue(()),
             };
             let control = Control::new().with_pass_end(&look);
-            let (report, _) = render(nested, 1, SPP, 1, both(&name, 1e9), &control).expect("it renders");
-            assert!(report.stopped && report.spp >= stop && report.spp < SPP, "{name}: {}", report.spp);
+            let (report, _) = render(nested, 1, spp, 1, both(&name, 1e9), &control).expect("it renders");
+            assert!(report.stopped && report.spp >= stop && report.spp < spp, "{name}: {}", report.spp);
             fs::remove_file(folder.join(format!("{name}.guide"))).expect("a file was written at the end");
         }
-        let (report, found) = render(nested, 1, SPP, 3, both(&name, 1e9), &Control::new()).expect("it goes on");
+        let (report, found) = render(nested, 1, spp, 3, both(&name, 1e9), &Control::new()).expect("it goes on");
         compare(&name, &report, &found);
         // Over already: the same picture again, without a sample.
-        let (again, found) = render(nested, 1, SPP, 3, both(&name, 1e9), &Control::new()).expect("it is over");
+        let (again, found) = render(nested, 1, spp, 3, both(&name, 1e9), &Control::new()).expect("it is over");
         assert!(found == bits && again.samples == report.samples, "{name}");
     }
-    let pixels = expected.samples / u64::from(SPP);
+    let pixels = expected.samples / u64::from(spp);
     for stop in inside {
         let name = format!("inside, after {stop}");
         let (taken, begun) = (AtomicU64::new(0), AtomicU64::new(u64::MAX));
@@ -263,10 +262,10 @@ fn interruptions_leave_no_trace(test: &str, nested: &str, after: &[&[u32]], insi
         let is_over = || taken.load(Ordering::Relaxed) > begun.load(Ordering::Relaxed);
         let clock = || Duration::from_secs(u64::from(is_over()));
         let control = Control::new().with_progress(&count).with_pass_end(&look).with_clock(&clock).with_deadline(0.5);
-        let (report, _) = render(nested, 1, SPP, 2, both(&name, 0.0), &control).expect("it renders");
+        let (report, _) = render(nested, 1, spp, 2, both(&name, 0.0), &control).expect("it renders");
         assert!(report.stopped && report.samples > pixels * u64::from(report.spp), "{name}: not inside a pass");
         let _ = fs::remove_file(folder.join(format!("{name}.guide")));
-        let (report, found) = render(nested, 1, SPP, 2, both(&name, 0.0), &Control::new()).expect("it goes on");
+        let (report, found) = render(nested, 1, spp, 2, both(&name, 0.0), &Control::new()).expect("it goes on");
         compare(&name, &report, &found);
     }
 }
@@ -276,8 +275,22 @@ fn interruptions_leave_no_trace(test: &str, nested: &str, after: &[&[u32]], insi
 fn hc_x02_an_interrupted_guided_run_has_the_same_bits() {
     let inside = [4, 13, 20, 45];
     let after: [&[u32]; 7] = [&[3], &[8], &[11], &[19], &[30], &[45], &[2, 9, 10, 23, 40]];
-    interruptions_leave_no_trace("interrupted", &guided(100, ""), &after, &inside);
-    interruptions_leave_no_trace("interrupted_left", &left_to_the_bsdf(100), &[&[11], &[2, 9, 23, 40]], &inside[2..]);
+    interruptions_leave_no_trace("interrupted", 64, &guided(100, ""), &after, &inside);
+    interruptions_leave_no_trace(
+        "interrupted_left",
+        64,
+        &left_to_the_bsdf(100),
+        &[&[11], &[2, 9, 23, 40]],
+        &inside[2..],
+    );
+}
+
+/// Whether learning goes on is judged at the end of an iteration, also where a run goes on just there.
+#[test]
+fn hc_x02_a_run_interrupted_before_a_judgement_has_the_same_bits() {
+    let nested = guided(100, "<string name='ending' value='variance'/>").replace("value='0.4'", "value='0.5'");
+    assert!(nested.contains("'learning' value='0.5'"));
+    interruptions_leave_no_trace("interrupted_judged", 600, &nested, &[&[256]], &[]);
 }
 
 /// Roulette that goes by what was found for the pixel and by what scattering has brought finds both again, with a guide
@@ -286,7 +299,7 @@ fn hc_x02_an_interrupted_guided_run_has_the_same_bits() {
 fn hc_x02_an_interrupted_run_with_learnt_roulette_has_the_same_bits() {
     let both = format!("{}{ADJOINT}", guided(100, ""));
     for (test, nested) in [("interrupted_adjoint", ADJOINT), ("interrupted_both", &both)] {
-        interruptions_leave_no_trace(test, nested, &[&[3], &[11], &[2, 9, 23, 40]], &[5, 36]);
+        interruptions_leave_no_trace(test, 64, nested, &[&[3], &[11], &[2, 9, 23, 40]], &[5, 36]);
     }
 }
 

@@ -232,7 +232,7 @@ impl Lesson<'_, '_> {
                 _ => (self.cx.control.seconds() - seconds) / f64::from(now),
             };
             self.at.course = Course { index: index + 1, part: None, pace, ..self.at.course };
-            if !part.startup && now > 0 {
+            if !part.startup {
                 self.expect(pace);
             }
         }
