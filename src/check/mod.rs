@@ -1,7 +1,7 @@
 //! The reference-matching suite: does a scene look the same as with the reference renderer, the `mitsuba` package?
 //!
 //! For each scene there is a reference, stored in the repository ([`stored`]), kept in a cache ([`cache`]) or rendered
-//! anew ([`reference`]). Lucerna renders the scene to the same standard error ([`ours`]); both pictures come in
+//! anew ([`mod@reference`]). Lucerna renders the scene to the same standard error ([`ours`]); both pictures come in
 //! independent passes, and [`lucerna_core::stats::images`] says whether they differ by more than noise.
 //!
 //! **Levels.** A run over many scenes is to raise a false alarm with a chance of [`SIGNIFICANCE`] in all: the level is
@@ -9,7 +9,7 @@
 //! sides (of a stored reference, on ours), and only what is found again at the same place counts.
 //!
 //! **Budget.** [`PASSES`] passes of so many samples that the standard error of the image mean is [`TARGET`] on either
-//! side, within limits ([`ours::plan`]): an error of 0.3 % in the mean is then found, in one scene or in a hundred.
+//! side, within limits (`ours::plan`): an error of 0.3 % in the mean is then found, in one scene or in a hundred.
 //! [`Comparison::detectable`] tells what was reached.
 //!
 //! **Ray offsets.** The reference starts rays a fixed fraction off surfaces and so leaks light through thin gaps;
