@@ -11,8 +11,8 @@
 //! Bitterli, version 3), 0.30 in kitchen.xml as published with `guided_path` (`--lenient --integrator path`) and 0.20 in the torus
 //! of `scenes/make_torus.py`; 0.08 in cornell-box, 0.07 in staircase, 0.01 under the sky of `tests/guiding/open.xml`, 0.00 in
 //! living-room-2 and classroom, -0.01 in `scenes/bathroom.xml`. What guiding is worth beside the roulette it comes with is
-//! another question, which this only helps to answer: of the first, kitchen and veach-ajar were seen to gain in seconds and the
-//! torus in thirty, dining-room was not.
+//! another question, which this only helps to answer, and `lucerna compare SCENE -m path path+roulette=adjoint path+guide=sd_tree`
+//! does.
 
 use lucerna_core::interfaces::{GuideRecord, RecordKind};
 use lucerna_core::io::limits::Cursor;

@@ -30,7 +30,7 @@ use std::sync::Arc;
 /// Tiles whose notes are held at the same time, at one sample per pixel: about 40 MiB.
 const NOTED: usize = 512;
 
-/// Records of either kind that these hold at most. Paths may split without end almost; so many would take 2 GiB.
+/// Records of either kind that these hold at most. Paths may split without end almost; so many of both take 1.6 GiB.
 const MOST_RECORDS: usize = 1 << 24;
 
 /// Samples per pixel of a pass at most, as in [`super::Schedule`].
