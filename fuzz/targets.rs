@@ -73,7 +73,8 @@ pub fn guide(bytes: &[u8]) -> bool {
     let (Some(guide), Ok(learnt)) = (guide, Learnt::of_content(bytes)) else { return false };
     let Ok(learner) = learnt.recall(&**guide, learnt.bounds) else { return false };
     let (arena, hit) = (Arena::new(), SurfaceHit { wi: Vec3::Z, ..SurfaceHit::default() });
-    if let Some(directions) = learner.field().at(&hit, GuidedVertex::default(), &arena) {
+    let field = learner.field();
+    if let Some(directions) = field.at(field.cell(hit.p), &hit, GuidedVertex::default(), &arena) {
         let (d, pdf) = directions.sample(Vec2::splat(0.5));
         assert!(d.is_finite() && pdf >= 0.0);
     }

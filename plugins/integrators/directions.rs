@@ -83,7 +83,7 @@ pub(super) trait Directions {
 
     /// What scattering at a vertex brings, as far as is known.
     #[inline(always)]
-    fn outlook(&self, _place: &Place) -> Option<Outlook> {
+    fn outlook(&self, _here: Self::Here, _place: &Place) -> Option<Outlook> {
         None
     }
 

@@ -38,6 +38,8 @@ pub(super) struct Learnt<'v> {
     primary: bool,
     /// What the guide knows here follows the product with the BSDF already.
     follows_product: bool,
+    /// The cell of space, if the guide was asked.
+    cell: Option<usize>,
 }
 
 impl<'a> Guided<'a> {
@@ -59,16 +61,16 @@ impl<'a> Directions for Guided<'a> {
         let lobes = bxdf.lobes();
         let directs = self.guidance.subjects.directions;
         if !directs || !is_guided(bxdf, lobes, self.guidance.least_roughness) {
-            return Learnt { guide: None, teaches: false, primary, follows_product: false };
+            return Learnt { guide: None, teaches: false, primary, follows_product: false, cell: None };
         }
         let vertex = GuidedVertex { one_sided: lobes.is_one_sided(), primary };
-        let known = if undecided { None } else { self.guidance.field.at(hit, vertex, self.arena) };
-        let guide = known.and_then(|guide| {
+        let cell = (!undecided).then(|| self.guidance.field.cell(hit.p));
+        let guide = cell.and_then(|cell| self.guidance.field.at(cell, hit, vertex, self.arena)).and_then(|guide| {
             let p = guide.p_guide().clamp(0.0, MOST_GUIDED);
             (p > 0.0).then_some((self.with_environment(guide, hit.p), p))
         });
         let follows_product = primary && self.guidance.sets == GuideSets::PrimaryProduct;
-        Learnt { guide, teaches: true, primary, follows_product }
+        Learnt { guide, teaches: true, primary, follows_product, cell }
     }
 
     #[inline]
@@ -204,8 +206,9 @@ impl<'a> Directions for Guided<'a> {
     }
 
     #[inline]
-    fn outlook(&self, place: &Place) -> Option<Outlook> {
-        self.guidance.field.outlook(place.p, place.n)
+    fn outlook(&self, here: Learnt<'a>, place: &Place) -> Option<Outlook> {
+        let field = self.guidance.field;
+        field.outlook(here.cell.unwrap_or_else(|| field.cell(place.p)), place.n)
     }
 
     #[inline]
@@ -306,7 +309,7 @@ mod tests {
             let bxdf = bsdf.resolve(&hit, &arena);
             for p_guide in [0.1, 0.5, 0.9] {
                 let guide = Some((&Above as &dyn GuidedDirections, p_guide));
-                let here = Learnt { guide, teaches: true, primary: true, follows_product: false };
+                let here = Learnt { guide, teaches: true, primary: true, follows_product: false, cell: None };
                 // Where the BSDF is black, a direction of the guide ends the path.
                 let density = |d: Vec3| {
                     let (value, pdf_bsdf) = bxdf.eval_pdf(hit.wi, hit.to_local(d), Transport::Radiance);

@@ -1,5 +1,6 @@
 //! All integrators: one file each, one line each in [`PLUGINS`].
 
+mod ahead;
 mod aov;
 mod common;
 mod decides;

@@ -24,8 +24,9 @@
 //! </integrator>
 //! ```
 
+use super::ahead::Ahead;
 use super::common::{COMMON, PATH, PathLimits, timeout};
-use super::directions::Unguided;
+use super::directions::{Directions, Unguided};
 use super::guided::Guided;
 use super::lights::{ByScene, LIGHTS, Lights};
 use super::path_kernel::trace;
@@ -145,7 +146,24 @@ impl GuidedEstimator for Path {
         notes: &mut Notebook,
     ) -> Radiance {
         let arena = &*arena;
-        let mut directions = Guided { guidance, notes, arena, prospects: Rgb::WHITE };
+        match guidance.subjects.directions {
+            true => self.trace(scene, camera, stream, arena, Guided { guidance, notes, arena, prospects: Rgb::WHITE }),
+            false => self.trace(scene, camera, stream, arena, Ahead { guidance, notes }),
+        }
+    }
+}
+
+impl Path {
+    /// A sample by these directions, for which something is learnt.
+    #[inline]
+    fn trace<'a, D: Directions<Here: 'a>>(
+        &self,
+        scene: &Scene,
+        camera: &CameraRay,
+        stream: &mut Stream<'_>,
+        arena: &'a Arena,
+        mut directions: D,
+    ) -> Radiance {
         let (limits, to) = (self.limits, &mut directions);
         let roulette: &dyn Roulette = self.roulette.as_deref().unwrap_or(&ByThroughput);
         match self.lights.ready() {

@@ -116,7 +116,7 @@ pub(super) fn trace<'v, D: Directions<Here: 'v>, R: Decides>(
                     found.alpha = 1.0;
                     let (prospects, goal) = (directions.prospects(throughput), directions.goal());
                     let path = PathState { throughput, prospects, eta, passage, due: depth >= rr_depth, depth, goal };
-                    wanted = limited(roulette.branches(&path, place.albedo, directions.outlook(&place)), splits);
+                    wanted = limited(roulette.branches(&path, place.albedo, directions.outlook(here, &place)), splits);
                     count = wanted as u32 + u32::from(u_left < wanted.fract());
                     if count == 0 {
                         break 'path;

@@ -105,7 +105,7 @@ impl Learned<'_> {
         let lobes = bxdf.lobes();
         let guided = self.field.guides() && is_guided(bxdf, lobes, self.least_roughness);
         let vertex = GuidedVertex { one_sided: lobes.is_one_sided(), primary: true };
-        let guide = self.field.at(&hit, vertex, &arena);
+        let guide = self.field.at(self.field.cell(hit.p), &hit, vertex, &arena);
         let p_guide = guide.filter(|_| guided).map_or(0.0, |guide| guide.p_guide().clamp(0.0, MOST_GUIDED));
         let of_bsdf = |d: Vec3| bxdf.eval_pdf(hit.wi, hit.to_local(d), Transport::Radiance).1;
         if let Some(guide) = guide {

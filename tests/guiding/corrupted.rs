@@ -129,11 +129,21 @@ fn key(p: Vec3) -> u64 {
 }
 
 impl GuideField for Field {
-    fn at<'g>(&'g self, hit: &SurfaceHit, vertex: GuidedVertex, arena: &'g Arena) -> Option<&'g dyn GuidedDirections> {
+    fn cell(&self, p: Vec3) -> usize {
+        self.inner.cell(p)
+    }
+
+    fn at<'g>(
+        &'g self,
+        cell: usize,
+        hit: &SurfaceHit,
+        vertex: GuidedVertex,
+        arena: &'g Arena,
+    ) -> Option<&'g dyn GuidedDirections> {
         if self.spoils.way == "empty" {
             return None;
         }
-        let inner = self.inner.at(hit, vertex, arena)?;
+        let inner = self.inner.at(cell, hit, vertex, arena)?;
         let p_guide = self.spoils.p_guide.unwrap_or_else(|| inner.p_guide());
         Some(arena.alloc(Spoilt { inner, way: &self.spoils.way, p_guide, key: key(hit.p) }))
     }
@@ -146,17 +156,17 @@ impl GuideField for Field {
         self.inner.incident(p, d)
     }
 
-    fn outlook(&self, p: Vec3, n: Vec3) -> Option<Outlook> {
+    fn outlook(&self, cell: usize, n: Vec3) -> Option<Outlook> {
         let all = |x| Some(Outlook { light: x, square: x, spread: x, cost: x });
         match &*self.spoils.outlook {
             "zero" => all(0.0),
             "huge" => all(1e30),
             "nan" => all(f32::NAN),
             "random" => {
-                let part = |i: u64| ((mix(key(p) ^ i) % 8) as f32 - 4.0).exp2();
+                let part = |i: u64| ((mix(mix(cell as u64) ^ i) % 8) as f32 - 4.0).exp2();
                 Some(Outlook { light: part(1), square: part(2), spread: part(3), cost: part(4) })
             }
-            _ => self.inner.outlook(p, n),
+            _ => self.inner.outlook(cell, n),
         }
     }
 

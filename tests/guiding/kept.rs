@@ -1,7 +1,7 @@
 //! What is learnt as a file, and guided runs that are interrupted: the same bits from the same file, and nothing that
 //! damaged files could do.
 
-use super::field::{self, REFLECTS, hit, train};
+use super::field::{self, REFLECTS, hit, known_at, train};
 use super::{SCENES, guided, left_to_the_bsdf, scene};
 use crate::support::damage::{Random, damage_bytes};
 use lucerna::core::interfaces::{Arena, GuideLearner, GuidedVertex};
@@ -193,7 +193,7 @@ fn damaged(sets: &str, versions: usize) -> usize {
         let (field, arena) = (recalled.field(), Arena::new());
         for p in [Vec3::splat(0.1), Vec3::new(0.9, 0.5, 0.2)] {
             if let Some(directions) =
-                field.at(&hit(p, Vec3::Z), GuidedVertex { primary: version % 2 == 0, ..REFLECTS }, &arena)
+                known_at(&*field, &hit(p, Vec3::Z), GuidedVertex { primary: version % 2 == 0, ..REFLECTS }, &arena)
             {
                 let (d, pdf) = directions.sample(Vec2::new(0.3, 0.8));
                 assert!(d.is_finite() && pdf >= 0.0, "{version}: {d} {pdf}");

@@ -1,6 +1,6 @@
 //! Two sets of directions in each cell: what goes to which, what is drawn from which, and what is kept.
 
-use super::field::{self, REFLECTS, hit, record};
+use super::field::{self, REFLECTS, hit, known_at, record};
 use super::kept::{SETS, UNIT, checkpoint, file, folder, render, trained};
 use super::{guided, scene};
 use crate::support::render_with;
@@ -41,7 +41,7 @@ fn light_of_a_half_hidden_lamp_is_learnt_in_the_set_for_it() {
     let field = half_hidden("half_hidden", "");
     for p in [Vec3::ZERO, Vec3::new(0.15, -0.1, 0.0), Vec3::new(-0.1, 0.15, 0.0)] {
         let arena = Arena::new();
-        let directions = field.at(&hit(p, Vec3::Z), REFLECTS, &arena).expect("something was learnt");
+        let directions = known_at(&*field, &hit(p, Vec3::Z), REFLECTS, &arena).expect("something was learnt");
         let towards = |x: f32, y: f32, z: f32| directions.pdf_sets((Vec3::new(x, y, z) - p).normalize());
         let (lamp, hidden, wall) = (towards(0.5, 0.0, 2.0), towards(-0.6, 0.0, 2.0), towards(-2.0, 0.0, 0.7));
         assert!(lamp[0] > 20.0 * UNIFORM && lamp[1] < 0.1 * lamp[0], "lamp {lamp:?} at {p}");
@@ -59,7 +59,7 @@ fn light_of_a_half_hidden_lamp_is_learnt_in_the_set_for_it() {
 fn light_that_is_not_learnt_is_in_no_set() {
     let field = half_hidden("not_learnt", "<boolean name='direct' value='false'/>");
     let arena = Arena::new();
-    let directions = field.at(&hit(Vec3::ZERO, Vec3::Z), REFLECTS, &arena).expect("something was learnt");
+    let directions = known_at(&*field, &hit(Vec3::ZERO, Vec3::Z), REFLECTS, &arena).expect("something was learnt");
     let [direct, rest] = directions.pdf_sets(Vec3::new(0.5, 0.0, 2.0).normalize());
     assert!(direct == rest && rest < UNIFORM, "{direct} {rest}");
     let wall = Vec3::new(-2.0, 0.0, 0.7).normalize();
@@ -94,7 +94,7 @@ fn first_hits_follow_what_they_scatter_and_others_the_light() {
     field.validate().expect("the field is sound");
     let densities = |vertex: GuidedVertex, n: Vec3| {
         let arena = Arena::new();
-        let directions = field.at(&hit(p, n), vertex, &arena).expect("something was learnt");
+        let directions = known_at(&*field, &hit(p, n), vertex, &arena).expect("something was learnt");
         let (d, pdf) = directions.sample(Vec2::new(0.4, 0.6));
         assert!((pdf / directions.pdf(d) - 1.0).abs() < 1e-4);
         let mut pcg = Pcg32::new(2, 2);

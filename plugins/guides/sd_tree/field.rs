@@ -41,12 +41,21 @@ pub struct Leaf {
 }
 
 impl GuideField for Field {
-    fn at<'g>(&'g self, hit: &SurfaceHit, vertex: GuidedVertex, arena: &'g Arena) -> Option<&'g dyn GuidedDirections> {
-        let index = self.tree.at(hit.p);
-        if let Some(apart) = self.apart.get(index) {
-            return self.at_apart((&self.leaves[index], apart), hit, vertex, arena);
+    fn cell(&self, p: Vec3) -> usize {
+        self.tree.at(p)
+    }
+
+    fn at<'g>(
+        &'g self,
+        cell: usize,
+        hit: &SurfaceHit,
+        vertex: GuidedVertex,
+        arena: &'g Arena,
+    ) -> Option<&'g dyn GuidedDirections> {
+        if let Some(apart) = self.apart.get(cell) {
+            return self.at_apart((&self.leaves[cell], apart), hit, vertex, arena);
         }
-        let (tree, p_guide) = self.near.get(index)?;
+        let (tree, p_guide) = self.near.get(cell)?;
         Some(arena.alloc(self.here(tree, p_guide, hit, vertex.one_sided)?))
     }
 
@@ -75,8 +84,8 @@ impl GuideField for Field {
         Some(of_leaf + of_apart.unwrap_or(0.0))
     }
 
-    fn outlook(&self, p: Vec3, n: Vec3) -> Option<Outlook> {
-        self.leaves[self.tree.at(p)].outlooks[side(n)]
+    fn outlook(&self, cell: usize, n: Vec3) -> Option<Outlook> {
+        self.leaves[cell].outlooks[side(n)]
     }
 
     fn validate(&self) -> Result<(), String> {

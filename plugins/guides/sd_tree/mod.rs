@@ -26,7 +26,7 @@
 //! | `nee` | string | always | when lights are sampled: `never`, `kickstart` (the first 128 samples per pixel), `always` |
 //! | `direct` | boolean | true | light that emitter sampling also finds is learnt, times the weight of finding it by scattering |
 //! | `startup` | integer | 8 | iterations of one sample per pixel before those that have as many samples as all before them |
-//! | `learning` | float | 0.2 | the last iteration, from which nothing is learnt, begins once so much of the budget is spent; 1/3 is nearly as published |
+//! | `learning` | float | 0.2 | the last iteration, from which nothing is learnt, begins once so much of the budget is spent, or half as much where paths are left to the BSDF; 1/3 is nearly as published |
 //! | `ending` | string | doubling | when else it begins: never (`doubling`), or, from 256 samples per pixel on, as soon as the `variance` that the rest of the budget would leave rises from one iteration to the next |
 //! | `combination` | string | inverse_variance | which iterations make the picture: the last four by `inverse_variance`, or the `last` |
 //! | `max_memory` | float | 64 | MiB that the trees may take; then they stay coarser |

@@ -62,7 +62,8 @@ pub struct Training {
     /// When the last iteration begins.
     pub ending: Ending,
     /// The part of the budget that may be spent when an iteration begins from which something is to be learnt. (Each is as
-    /// long as all before it; where a run begins with a file, it counts as spent what that would take.)
+    /// long as all before it; where a run begins with a file, it counts as spent what that would take.) Half of it where no
+    /// directions are learnt.
     pub learning: f64,
     /// What becomes of the pictures of the iterations.
     pub combination: Combination,
@@ -173,8 +174,18 @@ pub enum FactValue {
 
 /// What has been learnt.
 pub trait GuideField: Send + Sync {
-    /// The directions learnt where a path is scattered; `None` where nothing is known.
-    fn at<'g>(&'g self, hit: &SurfaceHit, vertex: GuidedVertex, arena: &'g Arena) -> Option<&'g dyn GuidedDirections>;
+    /// The number of the cell of space in which a point lies, by which [`at`](Self::at) and [`outlook`](Self::outlook) are
+    /// asked: a vertex asks both, and looks for it once.
+    fn cell(&self, p: Vec3) -> usize;
+
+    /// The directions learnt where a path is scattered, in cell `cell`; `None` where nothing is known.
+    fn at<'g>(
+        &'g self,
+        cell: usize,
+        hit: &SurfaceHit,
+        vertex: GuidedVertex,
+        arena: &'g Arena,
+    ) -> Option<&'g dyn GuidedDirections>;
 
     /// Whether paths are to be guided. If not, nobody asks [`at`](Self::at) or tells of directions.
     fn guides(&self) -> bool {
@@ -189,9 +200,9 @@ pub trait GuideField: Send + Sync {
     /// The radiance that arrives at a point from world direction `d`, roughly; `None` where nothing is known.
     fn incident(&self, p: Vec3, d: Vec3) -> Option<f32>;
 
-    /// What scattering at a point brings, on the side of a surface to which unit normal `n` points; `None` where too
+    /// What scattering in a cell brings, on the side of a surface to which unit normal `n` points; `None` where too
     /// little is known.
-    fn outlook(&self, _p: Vec3, _n: Vec3) -> Option<Outlook> {
+    fn outlook(&self, _cell: usize, _n: Vec3) -> Option<Outlook> {
         None
     }
 

@@ -20,7 +20,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 const TILE: u32 = 16;
 
 /// Tiles whose results are held at the same time; bounds memory on large films.
-const BATCH: usize = 1024;
+pub(super) const BATCH: usize = 1024;
 
 /// Samples per pixel that a run with a time limit plans for: enough for any budget.
 const ENDLESS: u32 = 1 << 24;
@@ -231,6 +231,8 @@ impl<'r, 'a> Run<'r, 'a> {
         for batch in self.tiles.chunks(batch) {
             let results: Vec<TileResult<T::Notes>> = batch
                 .par_iter()
+                // Else several tiles are one piece of work, and some threads have nothing to do in the end.
+                .with_max_len(1)
                 .map(|tile| {
                     let result = self.tile(tracer, *tile, start, end, report.spp);
                     let taken = self.taken.fetch_add(result.samples, Ordering::Relaxed) + result.samples;

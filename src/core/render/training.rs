@@ -15,7 +15,7 @@ use super::combine::Moments;
 use super::estimates::Estimates;
 use super::notebook::Notebook;
 use super::standing::{Course, Part, Standing};
-use super::tiles::{Run, Tracer, asked_spp, points};
+use super::tiles::{BATCH, Run, Tracer, asked_spp, points};
 use super::{Budget, Learnt, RenderContext, RenderError, Report, SampleOrder};
 use crate::interfaces::{
     Arena, CameraRay, Combination, Emitter, EmitterSampling, Ending, Goal, Guide, GuideField, GuideSets, Radiance,
@@ -35,6 +35,10 @@ const MOST_RECORDS: usize = 1 << 24;
 
 /// Samples per pixel of a pass at most, as in [`super::Schedule`].
 const LONGEST_PASS: u32 = 16;
+
+/// The part of [`Training::learning`] in which roulette learns what it needs, where no directions are learnt: means are known
+/// soon.
+const OF_OUTLOOKS: f64 = 0.5;
 
 /// Samples per pixel until which lights are sampled if that is for a start only (the default of the public code).
 const KICKSTART: u32 = 128;
@@ -257,7 +261,9 @@ impl Lesson<'_, '_> {
         let likely = self.samples_left(pace);
         // More would be spent on learning than is to be: this one is the last, and takes all that is left.
         let part = f64::from(wanted) / (f64::from(wanted) + f64::from(likely));
-        let last = enough || (!is_startup && part > self.training.learning);
+        let directs = self.subjects.directions && self.at.learner.field().guides();
+        let learning = if directs { self.training.learning } else { OF_OUTLOOKS * self.training.learning };
+        let last = enough || (!is_startup && part > learning);
         let size = if last { left } else { wanted.min(left) };
         // Nobody learns from the last one, unless what was learnt is kept.
         let learning = if last || size == left { self.keeps && wanted <= likely } else { true };
@@ -360,7 +366,7 @@ impl Lesson<'_, '_> {
         };
         // Notes are taken in as they come, so that those of a few tiles at most are held. A pass that is lost
         // afterwards has taught something nevertheless.
-        let batch = (NOTED / (end - start) as usize).max(1);
+        let batch = if learning { (NOTED / (end - start) as usize).max(1) } else { BATCH };
         let (estimator, estimates, most_records) = (self.estimator, &self.at.estimates, MOST_RECORDS / batch);
         let guided = Guided { estimator, guidance, learn_direct, most_records, estimates };
         let hand_over = |notes: Vec<TileNotes>| {
