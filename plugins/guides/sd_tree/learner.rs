@@ -19,7 +19,7 @@
 //! | weights of iterations | inverse mean variance of themselves | of the other half of the pixels, and no sample counts more than a later one |
 //! | roulette | none, or by the light ahead | by the light ahead, learnt for each side of surfaces in a cell |
 //! | iterations at the start, then | 8 of 1 sample, then 1, 2, 4, … | 8 of 1 sample, then as many as all before: 8, 16, 32, … |
-//! | the last iteration | as long as two would be, guided by an eighth of all samples | begins once an iteration more would have learning go beyond a fifth of the budget, since samples that are learnt from take longer |
+//! | the last iteration | as long as two would be, guided by an eighth of all samples | begins once an iteration more would have learning go beyond a fifth of the budget (a tenth, where paths are left to the BSDF), since samples that are learnt from take longer |
 
 use super::cylinder;
 use super::field::{Field, Leaf};
