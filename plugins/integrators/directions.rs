@@ -3,7 +3,7 @@
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{Bxdf, BxdfSample, Goal, Outlook, SurfaceHit, Transport};
 use lucerna_core::math::{Vec2, Vec3};
-use lucerna_core::render::Place;
+use lucerna_core::render::{Guidance, Notebook, Place};
 
 /// Who decides in which direction a path goes on, and keeps notes. What has an answer here has that where nothing is
 /// learnt.
@@ -15,10 +15,22 @@ pub(super) trait Directions {
     /// drawn here decides whether the sample is transparent, so that the BSDF has to choose.
     fn here(&self, hit: &SurfaceHit, bxdf: &dyn Bxdf, primary: bool, undecided: bool) -> Self::Here;
 
+    /// What holds during the pass, if something is learnt: the answers below follow from it.
+    #[inline(always)]
+    fn guidance(&self) -> Option<&Guidance<'_>> {
+        None
+    }
+
+    /// Where what is found is noted, while something is learnt.
+    #[inline(always)]
+    fn notes(&mut self) -> Option<&mut Notebook> {
+        None
+    }
+
     /// Whether lights are sampled that a ray can also run into.
     #[inline(always)]
     fn samples_emitters(&self) -> bool {
-        true
+        self.guidance().is_none_or(|guidance| guidance.sample_emitters)
     }
 
     /// Density of world direction `d` in which the BSDF alone has density `pdf_bsdf`.
@@ -66,19 +78,19 @@ pub(super) trait Directions {
     /// What is known of the pixel.
     #[inline(always)]
     fn goal(&self) -> Goal {
-        Goal::default()
+        self.guidance().map_or_else(Goal::default, |guidance| guidance.goal)
     }
 
     /// Whether what scattering brings is learnt, so that paths may split or end before they are scattered.
     #[inline(always)]
     fn looks_ahead(&self) -> bool {
-        false
+        self.guidance().is_some_and(|guidance| guidance.subjects.outlook)
     }
 
     /// Whether notes are kept.
     #[inline(always)]
     fn learns(&self) -> bool {
-        false
+        self.guidance().is_some_and(|guidance| guidance.learning)
     }
 
     /// What scattering at a vertex brings, as far as is known.
@@ -89,11 +101,19 @@ pub(super) trait Directions {
 
     /// Notes that so many branches go on from a vertex, each with this share, after so many rays.
     #[inline(always)]
-    fn note_fork(&mut self, _place: Place, _count: u32, _share: f32, _rays: u32) {}
+    fn note_fork(&mut self, place: Place, count: u32, share: f32, rays: u32) {
+        if let Some(notes) = self.notes() {
+            notes.forked(place, count, share, rays);
+        }
+    }
 
     /// Notes light of a sampled emitter.
     #[inline(always)]
-    fn note_direct(&mut self, _light: Rgb) {}
+    fn note_direct(&mut self, light: Rgb) {
+        if let Some(notes) = self.notes() {
+            notes.direct(light);
+        }
+    }
 
     /// Notes where the path goes on.
     #[inline(always)]
@@ -101,15 +121,27 @@ pub(super) trait Directions {
 
     /// Notes that roulette was survived.
     #[inline(always)]
-    fn note_survival(&mut self, _q: f32) {}
+    fn note_survival(&mut self, q: f32) {
+        if let Some(notes) = self.notes() {
+            notes.survived(q);
+        }
+    }
 
     /// Notes light that was found by chance.
     #[inline(always)]
-    fn note_met(&mut self, _light: Rgb, _alone: bool) {}
+    fn note_met(&mut self, light: Rgb, alone: bool) {
+        if let Some(notes) = self.notes() {
+            notes.met(light, alone);
+        }
+    }
 
     /// Notes the end of the path, or of a branch, after so many rays.
     #[inline(always)]
-    fn note_end(&mut self, _rays: u32) {}
+    fn note_end(&mut self, rays: u32) {
+        if let Some(notes) = self.notes() {
+            notes.end(rays);
+        }
+    }
 }
 
 /// A direction that was chosen.

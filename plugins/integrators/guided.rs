@@ -5,7 +5,7 @@ use super::directions::{Directions, Step, Unguided};
 use super::with_environment::WithEnvironment;
 use lucerna_core::color::Rgb;
 use lucerna_core::interfaces::{
-    Arena, Bxdf, BxdfSample, Goal, GuideSets, GuidedDirections, GuidedVertex, Lobes, MOST_GUIDED, Outlook, RecordKind,
+    Arena, Bxdf, BxdfSample, GuideSets, GuidedDirections, GuidedVertex, Lobes, MOST_GUIDED, Outlook, RecordKind,
     SurfaceHit, Transport, is_guided,
 };
 use lucerna_core::math::{ONE_MINUS_EPSILON, Vec2, Vec3};
@@ -59,8 +59,7 @@ impl<'a> Directions for Guided<'a> {
     #[inline]
     fn here(&self, hit: &SurfaceHit, bxdf: &dyn Bxdf, primary: bool, undecided: bool) -> Learnt<'a> {
         let lobes = bxdf.lobes();
-        let directs = self.guidance.subjects.directions;
-        if !directs || !is_guided(bxdf, lobes, self.guidance.least_roughness) {
+        if !is_guided(bxdf, lobes, self.guidance.least_roughness) {
             return Learnt { guide: None, teaches: false, primary, follows_product: false, cell: None };
         }
         let vertex = GuidedVertex { one_sided: lobes.is_one_sided(), primary };
@@ -73,9 +72,14 @@ impl<'a> Directions for Guided<'a> {
         Learnt { guide, teaches: true, primary, follows_product, cell }
     }
 
-    #[inline]
-    fn samples_emitters(&self) -> bool {
-        self.guidance.sample_emitters
+    #[inline(always)]
+    fn guidance(&self) -> Option<&Guidance<'_>> {
+        Some(&self.guidance)
+    }
+
+    #[inline(always)]
+    fn notes(&mut self) -> Option<&mut Notebook> {
+        self.guidance.learning.then_some(&mut *self.notes)
     }
 
     #[inline]
@@ -191,21 +195,6 @@ impl<'a> Directions for Guided<'a> {
     }
 
     #[inline]
-    fn goal(&self) -> Goal {
-        self.guidance.goal
-    }
-
-    #[inline]
-    fn looks_ahead(&self) -> bool {
-        self.guidance.subjects.outlook
-    }
-
-    #[inline]
-    fn learns(&self) -> bool {
-        self.guidance.learning
-    }
-
-    #[inline]
     fn outlook(&self, here: Learnt<'a>, place: &Place) -> Option<Outlook> {
         let field = self.guidance.field;
         field.outlook(here.cell.unwrap_or_else(|| field.cell(place.p)), place.n)
@@ -214,15 +203,8 @@ impl<'a> Directions for Guided<'a> {
     #[inline]
     fn note_fork(&mut self, place: Place, count: u32, share: f32, rays: u32) {
         self.prospects *= share;
-        if self.guidance.learning {
-            self.notes.forked(place, count, share, rays);
-        }
-    }
-
-    #[inline]
-    fn note_direct(&mut self, light: Rgb) {
-        if self.guidance.learning {
-            self.notes.direct(light);
+        if let Some(notes) = self.notes() {
+            notes.forked(place, count, share, rays);
         }
     }
 
@@ -258,22 +240,8 @@ impl<'a> Directions for Guided<'a> {
     #[inline]
     fn note_survival(&mut self, q: f32) {
         self.prospects *= 1.0 / q;
-        if self.guidance.learning {
-            self.notes.survived(q);
-        }
-    }
-
-    #[inline]
-    fn note_met(&mut self, light: Rgb, alone: bool) {
-        if self.guidance.learning {
-            self.notes.met(light, alone);
-        }
-    }
-
-    #[inline]
-    fn note_end(&mut self, rays: u32) {
-        if self.guidance.learning {
-            self.notes.end(rays);
+        if let Some(notes) = self.notes() {
+            notes.survived(q);
         }
     }
 }

@@ -261,13 +261,17 @@ impl Lesson<'_, '_> {
         let likely = self.samples_left(pace);
         // More would be spent on learning than is to be: this one is the last, and takes all that is left.
         let part = f64::from(wanted) / (f64::from(wanted) + f64::from(likely));
-        let directs = self.subjects.directions && self.at.learner.field().guides();
-        let learning = if directs { self.training.learning } else { OF_OUTLOOKS * self.training.learning };
+        let learning = if self.directs() { self.training.learning } else { OF_OUTLOOKS * self.training.learning };
         let last = enough || (!is_startup && part > learning);
         let size = if last { left } else { wanted.min(left) };
         // Nobody learns from the last one, unless what was learnt is kept.
         let learning = if last || size == left { self.keeps && wanted <= likely } else { true };
         (size > 0).then_some(Part { startup: is_startup, spp: (begin, begin + size), wanted, learning })
+    }
+
+    /// Whether paths are guided, as far as is known.
+    fn directs(&self) -> bool {
+        self.subjects.directions && self.at.learner.field().guides()
     }
 
     /// Samples per pixel that the budget still allows, about, at so many seconds each.
@@ -345,8 +349,7 @@ impl Lesson<'_, '_> {
         let Training { learn_direct, least_roughness, candidates, .. } = self.training;
         let environment = self.environment;
         let field = self.at.learner.field();
-        let directions = self.subjects.directions && field.guides();
-        let subjects = Subjects { directions, ..self.subjects };
+        let subjects = Subjects { directions: self.directs(), ..self.subjects };
         let learning = learning && (subjects.directions || subjects.outlook);
         if subjects.outlook && start > 0 {
             self.at.estimates.update(self.at.report.rays as f64 / self.at.report.samples as f64);
