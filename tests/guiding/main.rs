@@ -7,6 +7,7 @@ mod corrupted;
 mod determinism;
 mod field;
 mod kept;
+mod photons;
 mod published;
 mod roulette;
 mod sets;

@@ -9,6 +9,7 @@
 //! | part of the flux until directions are divided, depth | 0.01, 20 | the same; but not where few records have nearly all of it |
 //! | what a record counts | what it found | as much as all others in its cell together, at most: one that met a sun by chance would hide for many iterations what was found before and after (not with two `sets`) |
 //! | where a bright environment is hidden by glass | found by chance | a part of the directions [goes there](lucerna_core::interfaces::Training::to_environment) |
+//! | light through glass and off mirrors | found by chance | [photons](super::photons) tell of it |
 //! | upper levels of quadtrees | as the flux asks | always three, as a table that the cosine can weight |
 //! | filter of directions | cut off at the edges | goes round in the azimuth, is moved inside at the poles |
 //! | probability of the guide | any | from 0.05 to 0.7 if learnt, at most 0.95 if given |
@@ -33,9 +34,9 @@ use super::spatial::{self, SpatialTree};
 use super::sums::{Refinement, Sums};
 use super::{DirectionalFilter, Settings, SpatialFilter};
 use lucerna_core::interfaces::{
-    GuideFact, GuideField, GuideLearner, GuideRecord, GuideSets, RecordKind, VertexRecord, mix,
+    GuideFact, GuideField, GuideLearner, GuideRecord, GuideSets, Photon, RecordKind, VertexRecord, mix,
 };
-use lucerna_core::math::Aabb;
+use lucerna_core::math::{Aabb, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -170,7 +171,7 @@ impl Learner {
     }
 
     /// Mean flux of the records that the cells know of.
-    fn usual(&self) -> f64 {
+    pub(super) fn usual(&self) -> f64 {
         let (flux, count) =
             self.cells.iter().fold((0.0, 0.0), |(flux, count), cell| (flux + cell.sums.total(), count + cell.count));
         if count > 0.0 { flux / count } else { 0.0 }
@@ -320,6 +321,10 @@ impl GuideLearner for Learner {
         });
     }
 
+    fn learn_photons(&mut self, photons: &[Photon]) {
+        self.join_photons(photons);
+    }
+
     fn refine(&mut self, spp: u32) {
         let too_little =
             self.gain().is_some_and(|gain| gain < self.settings.asked_gain(self.iterations.saturating_add(1)));
@@ -439,10 +444,15 @@ fn flux(record: &GuideRecord) -> f64 {
 /// no density.
 #[inline]
 pub(super) fn put(sums: &mut Sums, record: &GuideRecord, flux: f64, filter: DirectionalFilter) {
-    if !(flux > 0.0 && flux.is_finite()) || record.kind == RecordKind::Delta {
-        return;
+    if flux > 0.0 && flux.is_finite() && record.kind != RecordKind::Delta {
+        put_from(sums, record.d, flux, filter);
     }
-    let p = cylinder::of_direction(record.d);
+}
+
+/// Adds flux from a world direction.
+#[inline]
+pub(super) fn put_from(sums: &mut Sums, d: Vec3, flux: f64, filter: DirectionalFilter) {
+    let p = cylinder::of_direction(d);
     match filter {
         DirectionalFilter::Nearest => sums.add(p, flux),
         DirectionalFilter::Box => sums.add_box(p, flux),
@@ -454,7 +464,6 @@ mod tests {
     use super::super::OUTLOOK;
     use super::super::mixing::tests::found_in_a_part;
     use super::*;
-    use lucerna_core::math::Vec3;
     use lucerna_core::sampling::Pcg32;
 
     /// Where cells are small beside the one that a record lies in, few of them get a part of it, and all what is due to them

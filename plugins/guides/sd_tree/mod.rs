@@ -19,6 +19,7 @@
 //! | `p_guide` | float | unset | probability of the guide, limited to 0.95; learnt if unset, up to 0.7 |
 //! | `least_gain` | float | 0.12 | if the mixture is closer than the BSDF alone to the light that is scattered by less than so many nats (divergence of Kullback and Leibler, mean over all vertices), the rest of the picture is left to the BSDF, and to roulette; 0: never. Only where `p_guide` is learnt and `sets` is `one` |
 //! | `environment` | float | 0.1 | part of the guide's directions that go where the environment is bright, learnt or not, in scenes with glass or masks, behind which emitter sampling does not see it; 0 as published |
+//! | `photons` | float | 0.5 | part of the guide's directions, at most, that go where light came from that was followed from lamps through glass and off mirrors; less where paths find little there; 0 as published |
 //! | `product` | string | cosine | what the guide follows: `none`, the light alone; `cosine`, its product with the cosine, for BSDFs that reflect only; `resampling`, its product with any BSDF, by a choice among candidates |
 //! | `candidates` | integer | 2 | for `resampling`: directions drawn at a vertex, of which one is followed |
 //! | `sets` | string | one | sets of directions in each cell of space: `one`; `direct_indirect`, one for light of emitters that a scattered ray runs into and one for all other light, whose mixture is learnt; `primary_product`, one for what first hits scatter towards the camera (light times BSDF times cosine) and one for light that arrives at later vertices |
@@ -78,6 +79,7 @@ mod mixing;
 mod near;
 mod outlook;
 mod pair;
+mod photons;
 mod prior;
 mod quadtree;
 mod sets;
@@ -120,6 +122,12 @@ pub const PLUGIN: Plugin = Plugin {
             .range(0.0, 1e3),
         Param::float("environment", 0.1, "part of the guide that goes to a bright environment behind glass")
             .range(0.0, 0.5),
+        Param::float(
+            "photons",
+            0.5,
+            "part of the guide, at most, that goes to light followed from lamps through glass",
+        )
+        .range(0.0, 0.9),
         Param::choice(
             "product",
             &["none", "cosine", "resampling"],
@@ -173,6 +181,8 @@ struct Settings {
     prior: f64,
     /// Part of what was found that still counts an iteration later.
     memory: f64,
+    /// Part of the directions that photons have, at most.
+    photons: f64,
     spatial_filter: SpatialFilter,
     directional_filter: DirectionalFilter,
     p_guide: Option<f32>,
@@ -222,6 +232,7 @@ fn build(p: &Properties<'_>) -> Built<dyn Guide> {
         depth: number("directional_depth"),
         prior: p.double("prior"),
         memory: p.double("memory"),
+        photons: p.double("photons"),
         spatial_filter: match p.choice("spatial_filter") {
             "nearest" => SpatialFilter::Nearest,
             "box" => SpatialFilter::Box,
@@ -259,6 +270,7 @@ fn build(p: &Properties<'_>) -> Built<dyn Guide> {
         learn_direct: p.bool("direct"),
         least_roughness: p.float("roughness_threshold"),
         to_environment: p.float("environment"),
+        to_photons: p.float("photons"),
         candidates: if p.choice("product") == "resampling" { number("candidates") } else { 1 },
     };
     Ok(Arc::new(SdTree { settings, training, file: file(p)? }))
@@ -298,6 +310,7 @@ const OUTLOOK: Settings = Settings {
     trial: 0,
     prior: 0.0,
     memory: 0.0,
+    photons: 0.0,
     cosine: false,
     max_bytes: 64 << 20,
     sets: GuideSets::One,
@@ -317,6 +330,7 @@ pub(crate) fn outlook_alone() -> Arc<dyn Guide> {
         learn_direct: true,
         least_roughness: 0.0,
         to_environment: 0.0,
+        to_photons: 0.0,
         candidates: 1,
     };
     Arc::new(SdTree { settings: OUTLOOK, training, file: None })

@@ -182,6 +182,37 @@ impl Sums {
         self.cells().iter().map(|found| found.flux).sum()
     }
 
+    /// The same tree, in which nothing was found.
+    pub fn emptied(&self) -> Sums {
+        let nodes = self.nodes.iter().map(|node| Node { child: node.child, ..Node::default() }).collect();
+        Sums { grid: [Found::default(); CELLS], roots: self.roots, nodes }
+    }
+
+    /// The part of the flux that is distributed alike in two trees of the same form: 1 if all is, 0 if one has nothing where
+    /// the other has something.
+    pub fn common(&self, other: &Sums) -> f64 {
+        let parts = [1.0 / self.total(), 1.0 / other.total()];
+        let of_leaves = |a: &Found, b: &Found| (parts[0] * a.flux).min(parts[1] * b.flux);
+        let grid = self.grid.iter().zip(&other.grid).map(|(a, b)| of_leaves(a, b)).sum::<f64>();
+        let nodes = self.nodes.iter().zip(&other.nodes).flat_map(|(a, b)| a.value.iter().zip(&b.value));
+        // What is no leaf has nothing of its own.
+        grid + nodes.map(|(a, b)| of_leaves(a, b)).sum::<f64>()
+    }
+
+    /// Leaves only the rest of the flux, and adds a part of this flux as it is distributed in a tree of the same form, which has
+    /// some.
+    pub fn give(&mut self, part: f64, flux: f64, other: &Sums) {
+        let times = part * flux / other.total();
+        let blend = |to: &mut Found, from: &Found| {
+            let other = Found { flux: times * from.flux, squares: times * times * from.squares };
+            *to = to.part(1.0 - part).and(other);
+        };
+        self.grid.iter_mut().zip(&other.grid).for_each(|(to, from)| blend(to, from));
+        for (to, from) in self.nodes.iter_mut().zip(&other.nodes) {
+            to.value.iter_mut().zip(&from.value).for_each(|(to, from)| blend(to, from));
+        }
+    }
+
     /// A tree whose leaves have about the same flux each, if that is distributed as here, with a part of what was found.
     /// Cells in which few records have nearly all the flux stay whole: where exactly it lies is not known.
     pub fn refined(&self, how: Refinement) -> Sums {

@@ -76,6 +76,9 @@ pub struct Training {
     /// The part of a guide's directions that go where the environment is bright, in scenes where emitter sampling cannot see
     /// all that a ray sees of it.
     pub to_environment: f32,
+    /// The part of a guide's directions, at most, that go where [`Photon`]s came from, in scenes with surfaces that turn light
+    /// without scattering it; 0 if none are sent out.
+    pub to_photons: f32,
     /// Directions that are tried at a vertex before one of them is chosen by the product of the BSDF and the light
     /// learnt.
     pub candidates: u32,
@@ -122,6 +125,17 @@ pub enum EmitterSampling {
     Always,
 }
 
+/// Light that has arrived where paths are guided, on its way from a lamp.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Photon {
+    /// Where.
+    pub p: Vec3,
+    /// World direction to where it came from.
+    pub d: Vec3,
+    /// Its power times the number of those sent out, in W; positive.
+    pub power: f32,
+}
+
 /// Takes in what paths have found.
 pub trait GuideLearner: Send {
     /// Takes in the records of some tiles, in the order of the tiles.
@@ -129,6 +143,9 @@ pub trait GuideLearner: Send {
 
     /// Takes in what the vertices in some tiles have scattered, in the order of the tiles.
     fn learn_outlook(&mut self, _tiles: &[Vec<VertexRecord>]) {}
+
+    /// Takes in photons, when all records of an iteration are: all that have arrived so far, those told of before among them.
+    fn learn_photons(&mut self, _photons: &[Photon]) {}
 
     /// Ends an iteration of so many samples per pixel: [`field`](Self::field) now has what was taken in.
     fn refine(&mut self, spp: u32);

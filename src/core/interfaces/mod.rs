@@ -33,8 +33,8 @@ pub use emitter::{Emitter, EmitterFlags, LightBounds, LightPoint, LightSample};
 pub use film::{ComponentFormat, FileFormat, Film, FilmSettings, PixelFormat};
 pub use guide::{
     Combination, EmitterSampling, Ending, FactValue, Guide, GuideFact, GuideField, GuideFile, GuideLearner,
-    GuideRecord, GuideSets, GuidedDirections, GuidedVertex, MOST_GUIDED, RecordKind, Subjects, Training, VertexRecord,
-    is_guided,
+    GuideRecord, GuideSets, GuidedDirections, GuidedVertex, MOST_GUIDED, Photon, RecordKind, Subjects, Training,
+    VertexRecord, is_guided,
 };
 pub use integrator::{Integrator, Radiance, RadianceEstimator};
 pub use light_sampler::{Light, LightSampler, LightSelection, LightVertex, long_number};

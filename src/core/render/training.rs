@@ -14,6 +14,7 @@ use super::checkpoint::Keeper;
 use super::combine::Moments;
 use super::estimates::Estimates;
 use super::notebook::Notebook;
+use super::photons::Photons;
 use super::standing::{Course, Part, Standing};
 use super::tiles::{BATCH, Run, Tracer, asked_spp, points};
 use super::{Budget, Learnt, RenderContext, RenderError, Report, SampleOrder};
@@ -123,6 +124,7 @@ pub fn render_guided(
     let frozen = file.as_ref().is_some_and(|file| file.frozen);
     let (keeps, pace, snapshot) = (left_in.is_some(), 0.0, None);
     let environment = hidden_environment(cx.scene, training.to_environment);
+    let photons = (training.to_photons > 0.0).then(|| Photons::new(cx.scene, training.least_roughness)).flatten();
     let mut lesson = Lesson {
         cx,
         run,
@@ -130,6 +132,7 @@ pub fn render_guided(
         training,
         subjects,
         environment,
+        photons,
         keeper,
         at,
         asked,
@@ -177,6 +180,8 @@ struct Lesson<'r, 'a> {
     training: Training,
     subjects: Subjects,
     environment: Option<(&'a dyn Emitter, f32)>,
+    /// Light from the lamps, if the guide is to be told of any.
+    photons: Option<Photons<'a>>,
     keeper: Option<Keeper<'a>>,
     at: Standing,
     /// Samples per pixel of the whole run.
@@ -223,6 +228,7 @@ impl Lesson<'_, '_> {
             // The last one may be over early, by the clock.
             let (done, now) = (self.at.report.spp - part.spp.0, self.at.report.spp - spp);
             if part.learning && done >= part.wanted {
+                self.send_photons();
                 self.at.learner.refine(done);
                 self.at.course.taught = true;
                 self.at.course.reach = self.at.course.reach.max(done);
@@ -239,6 +245,15 @@ impl Lesson<'_, '_> {
             if !part.startup {
                 self.expect(pace);
             }
+        }
+    }
+
+    /// Sends photons out for the paths there have been, and tells of all that have arrived.
+    fn send_photons(&mut self) {
+        let directs = self.directs();
+        if let Some(photons) = self.photons.as_mut().filter(|_| directs) {
+            let arrived = photons.after(self.at.report.samples, self.at.course.seed);
+            self.at.learner.learn_photons(arrived);
         }
     }
 
