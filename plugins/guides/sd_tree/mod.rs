@@ -34,8 +34,11 @@
 //! | `file` | string | unset | a file to begin with, if it is there, and to leave what was learnt in; a relative name is looked for beside the scene. Only `render` writes it, and its `--guide-file` takes the place of both this and `frozen` |
 //! | `frozen` | boolean | false | nothing is learnt, and the file, which must be there, stays as it is |
 //!
-//! Where light is found rarely but from few directions, as that of a small lamp through glass, `prior` may hide what was
-//! found, and a fifth of the budget may be too little to learn from.
+//! Light of lamps behind glass, or by way of mirrors, which paths meet by chance only, is followed from the lamps: `photons`
+//! tell each cell from where it comes before a path has found it. Scenes without delta lobes have none and pay nothing. Not
+//! followed is light off gloss, or turned by shapes that are placed as instances; with `primary_product` what first hits
+//! scatter is learnt from paths alone. Where such light is rare in what paths find, `prior` may hide it, and a fifth of the
+//! budget may be too little to learn from:
 //! `lucerna compare scene.xml -m path path+guide=sd_tree path+guide=sd_tree:prior=0,learning=0.333` tells that, and what
 //! each sample costs.
 //!
@@ -52,7 +55,7 @@
 //! sampled lights or from caustics that are rarely found, gain little, and each sample costs more: least where rays are
 //! dear, as in large scenes, and most in a box of few triangles. Each candidate of `resampling` asks the guide and the
 //! BSDF again; it pays where rays are dear and BSDFs are not diffuse. `prior` 0, `memory` 0, `spatial_threshold` 12000,
-//! both filters `nearest`, `p_guide` 0.5, `product` `none`, `startup` 0, `environment` 0 and `combination` `last` are nearly
+//! both filters `nearest`, `p_guide` 0.5, `product` `none`, `startup` 0, `environment` 0, `photons` 0 and `combination` `last` are nearly
 //! the form of 2017.
 //!
 //! Samples are never clamped, guided or not. A limit to what a sample may count would take more light where the guide knows
