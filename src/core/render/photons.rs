@@ -125,7 +125,7 @@ impl<'s> Photons<'s> {
             let (u1, u2) = (pcg.next_f32(), Vec2::new(pcg.next_f32(), pcg.next_f32()));
             let Some(sample) = bxdf.sample(hit.wi, u1, u2, Transport::Importance) else { return };
             power *= sample.weight.luminance();
-            if !sample.lobe.has_delta() || !(power > 0.0 && power.is_finite()) {
+            if !(sample.lobe.has_delta() && power > 0.0 && power.is_finite()) {
                 return;
             }
             let ray = hit.leave(hit.to_world(sample.wo));
