@@ -19,7 +19,7 @@
 //! | `p_guide` | float | unset | probability of the guide, limited to 0.95; learnt if unset, up to 0.7 |
 //! | `least_gain` | float | 0.12 | if the mixture is closer than the BSDF alone to the light that is scattered by less than so many nats (divergence of Kullback and Leibler, mean over all vertices), the rest of the picture is left to the BSDF, and to roulette; 0: never. Only where `p_guide` is learnt and `sets` is `one` |
 //! | `environment` | float | 0.1 | part of the guide's directions that go where the environment is bright, learnt or not, in scenes with glass or masks, behind which emitter sampling does not see it; 0 as published |
-//! | `photons` | float | 0.5 | part of the guide's directions, at most, that go where light came from that was followed from lamps through glass and off mirrors; less where paths find little there; 0 as published |
+//! | `photons` | float | 0.5 | part of the guide's directions, at most, that is given anew in each iteration to where light came from that was followed from lamps through glass and off mirrors; less where paths find little there; 0 as published |
 //! | `product` | string | cosine | what the guide follows: `none`, the light alone; `cosine`, its product with the cosine, for BSDFs that reflect only; `resampling`, its product with any BSDF, by a choice among candidates |
 //! | `candidates` | integer | 2 | for `resampling`: directions drawn at a vertex, of which one is followed |
 //! | `sets` | string | one | sets of directions in each cell of space: `one`; `direct_indirect`, one for light of emitters that a scattered ray runs into and one for all other light, whose mixture is learnt; `primary_product`, one for what first hits scatter towards the camera (light times BSDF times cosine) and one for light that arrives at later vertices |
@@ -35,9 +35,11 @@
 //! | `frozen` | boolean | false | nothing is learnt, and the file, which must be there, stays as it is |
 //!
 //! Light of lamps behind glass, or by way of mirrors, which paths meet by chance only, is followed from the lamps: `photons`
-//! tell each cell from where it comes before a path has found it. Scenes without delta lobes have none and pay nothing. Not
-//! followed is light off gloss, or turned by shapes that are placed as instances; with `primary_product` what first hits
-//! scatter is learnt from paths alone. Where such light is rare in what paths find, `prior` may hide it, and a fifth of the
+//! tell each cell from where it comes before a path has found it. Scenes without delta lobes have none and pay nothing;
+//! smooth `plastic` and `mask` have such lobes too. What `memory` keeps of photons comes on top of their part: about two
+//! thirds at most by default; a cell in which paths have found nothing at all follows photons alone. Not followed is light
+//! off gloss, or that is first turned by shapes placed as instances; nor do photons know how long the integrator lets paths
+//! be. With `primary_product` what first hits scatter is learnt from paths alone. Where such light is rare in what paths find, `prior` may hide it, and a fifth of the
 //! budget may be too little to learn from:
 //! `lucerna compare scene.xml -m path path+guide=sd_tree path+guide=sd_tree:prior=0,learning=0.333` tells that, and what
 //! each sample costs.
@@ -55,8 +57,8 @@
 //! sampled lights or from caustics that are rarely found, gain little, and each sample costs more: least where rays are
 //! dear, as in large scenes, and most in a box of few triangles. Each candidate of `resampling` asks the guide and the
 //! BSDF again; it pays where rays are dear and BSDFs are not diffuse. `prior` 0, `memory` 0, `spatial_threshold` 12000,
-//! both filters `nearest`, `p_guide` 0.5, `product` `none`, `startup` 0, `environment` 0, `photons` 0 and `combination` `last` are nearly
-//! the form of 2017.
+//! both filters `nearest`, `p_guide` 0.5, `product` `none`, `startup` 0, `environment` 0, `photons` 0 and `combination`
+//! `last` are nearly the form of 2017.
 //!
 //! Samples are never clamped, guided or not. A limit to what a sample may count would take more light where the guide knows
 //! little than where it knows much, and leave patches along the edges of its cells, most of all in shadows. More samples,

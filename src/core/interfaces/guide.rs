@@ -132,7 +132,7 @@ pub struct Photon {
     pub p: Vec3,
     /// World direction to where it came from.
     pub d: Vec3,
-    /// Its power times the number of those sent out, in W; positive.
+    /// Its power times the number of those sent out, in the unit of radiance times m² sr, the mean of the channels; positive.
     pub power: f32,
 }
 

@@ -228,7 +228,11 @@ impl Lesson<'_, '_> {
             // The last one may be over early, by the clock.
             let (done, now) = (self.at.report.spp - part.spp.0, self.at.report.spp - spp);
             if part.learning && done >= part.wanted {
-                self.send_photons();
+                // One that is stopped here goes on here, as if it had been stopped before its last sample. Time that is up
+                // stops photons only.
+                if !self.send_photons(complete) && self.cx.control.is_stopped() {
+                    return;
+                }
                 self.at.learner.refine(done);
                 self.at.course.taught = true;
                 self.at.course.reach = self.at.course.reach.max(done);
@@ -248,13 +252,16 @@ impl Lesson<'_, '_> {
         }
     }
 
-    /// Sends photons out for the paths there have been, and tells of all that have arrived.
-    fn send_photons(&mut self) {
-        let directs = self.directs();
-        if let Some(photons) = self.photons.as_mut().filter(|_| directs) {
-            let arrived = photons.after(self.at.report.samples, self.at.course.seed);
-            self.at.learner.learn_photons(arrived);
+    /// Sends photons out for the paths there have been, unless there is no `more` time for that, and tells of all that have
+    /// arrived. Whether all that were to be sent out were.
+    fn send_photons(&mut self, more: bool) -> bool {
+        let (directs, control) = (self.directs(), &self.cx.control);
+        let Some(photons) = self.photons.as_mut().filter(|_| directs) else { return true };
+        let all = !more || photons.send(self.at.report.samples, self.at.course.seed, || control.should_stop());
+        if all || !control.is_stopped() {
+            self.at.learner.learn_photons(photons.arrived());
         }
+        all
     }
 
     /// Extrapolates the variance of the picture from the latest iteration, and judges by that if it is to be.
