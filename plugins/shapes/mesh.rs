@@ -23,8 +23,8 @@ pub struct Mesh {
     flip_normals: bool,
     bounds: Aabb,
     area: f32,
-    /// Chance of each triangle in area sampling; made when first asked for: lights need it, and what
-    /// photons begin at. 12 to 16 bytes each.
+    /// Chance of each triangle in area sampling; made when first asked for: lights need it, and what photons begin at.
+    /// 12 to 16 bytes each.
     choice: OnceLock<Option<Discrete>>,
     /// The mesh flattened to the uv plane, for [`Shape::at_uv`]; made when first asked for.
     chart: OnceLock<Option<Accel>>,

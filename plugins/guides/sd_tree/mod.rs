@@ -36,11 +36,11 @@
 //!
 //! Light of lamps behind glass, or by way of mirrors, which paths meet by chance only, is followed from the lamps: `photons`
 //! tell each cell from where it comes before a path has found it. Scenes without delta lobes have none and pay nothing;
-//! smooth `plastic` and `mask` have such lobes too. What `memory` keeps of photons comes on top of their part: about two
-//! thirds at most by default; a cell in which paths have found nothing at all follows photons alone. Not followed is light
-//! off gloss, or that is first turned by shapes placed as instances; nor do photons know how long the integrator lets paths
-//! be. With `primary_product` what first hits scatter is learnt from paths alone. Where such light is rare in what paths find, `prior` may hide it, and a fifth of the
-//! budget may be too little to learn from:
+//! smooth `plastic` and `mask` have such lobes too. What `memory` keeps of photons comes on top of their part, and a cell in
+//! which paths have found nothing at all follows photons alone. Not followed is light off gloss, or that is first turned by
+//! shapes placed as instances; nor do photons know how long the integrator lets paths be. With `primary_product` what first
+//! hits scatter is learnt from paths alone. Where such light is rare in what paths find, `prior` may hide it, and a fifth of
+//! the budget may be too little to learn from:
 //! `lucerna compare scene.xml -m path path+guide=sd_tree path+guide=sd_tree:prior=0,learning=0.333` tells that, and what
 //! each sample costs.
 //!

@@ -222,17 +222,18 @@ impl Lesson<'_, '_> {
             self.at.course.part = Some(part);
             let (seconds, spp) = (self.cx.control.seconds(), self.at.report.spp);
             let complete = self.iteration(part);
+            // The last one may be over early, by the clock.
+            let (done, now) = (self.at.report.spp - part.spp.0, self.at.report.spp - spp);
+            let teaches = part.learning && done >= part.wanted;
+            // One that is stopped here goes on here: nothing but its samples may count yet. Time that is up stops photons
+            // only.
+            if teaches && !self.send_photons(complete) && self.cx.control.is_stopped() {
+                return;
+            }
             if complete && (!part.startup || index + 1 == self.at.course.startup) {
                 self.at.pictures.complete();
             }
-            // The last one may be over early, by the clock.
-            let (done, now) = (self.at.report.spp - part.spp.0, self.at.report.spp - spp);
-            if part.learning && done >= part.wanted {
-                // One that is stopped here goes on here, as if it had been stopped before its last sample. Time that is up
-                // stops photons only.
-                if !self.send_photons(complete) && self.cx.control.is_stopped() {
-                    return;
-                }
+            if teaches {
                 self.at.learner.refine(done);
                 self.at.course.taught = true;
                 self.at.course.reach = self.at.course.reach.max(done);
